@@ -43,7 +43,9 @@ def edit(folder, text):
     (folder / path).write_text("".join(lines), encoding="utf-8")
 
 
-@pytest.mark.timeout(300)  # two matrices, and two checks of a sensor in processes of their own
+@pytest.mark.timeout(
+    600
+)  # two matrices of 110 and 220 recordings, and two checks of a sensor in processes of their own
 def test_the_page_as_it_is_written(shell, tmp_path):
     shell.folder = tmp_path / "ring-pad"
     shell.folder.mkdir()

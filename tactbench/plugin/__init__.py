@@ -30,6 +30,7 @@ from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import (
     EstimatorDescriptor,
     IndenterDescriptor,
+    ManualFrame,
     ProfileDescriptor,
     RigDescriptor,
     SensorDescriptor,
@@ -69,6 +70,7 @@ __all__ = [
     "Indenter",
     "IndenterDescriptor",
     "LabelTarget",
+    "ManualFrame",
     "MissingRecordingError",
     "NotApplicable",
     "Parameter",

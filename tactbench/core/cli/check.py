@@ -26,6 +26,8 @@ if TYPE_CHECKING:
               help="Check this recording of the sensor, importing no code of the plugin.")  # fmt: skip
 @click.option("--rig-file", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
               help="Also open the device's line, or press with the rig, as this file says; prompts first.")  # fmt: skip
+@click.option("--root", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
+              help="Folder that holds the files of a data set; without it those that were fetched.")  # fmt: skip
 @YES
 @click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
               help="Store a sensor's level in this result folder: its tables show it. Runs all checks.")  # fmt: skip
@@ -33,12 +35,12 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     ctx: click.Context, name: str | None, listed: bool, recording: Path | None, rig_file: Path | None,
-    yes: bool, out: Path | None, shape: str,
+    root: Path | None, yes: bool, out: Path | None, shape: str,
 ) -> None:  # fmt: skip
-    """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter or profile.
+    """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
 
-    NAME is one of these, or a plugin: then all it brings is checked. Without --rig-file nothing is opened and nothing
-    moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
+    NAME is one of these, a mapping file, or a plugin: then all it brings is checked. Without --rig-file nothing is
+    opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     from tactbench.core.cli.grid import print_fields
     from tactbench.core.conformance.check import CHECKS, KINDS, Mode
@@ -63,7 +65,7 @@ def command(
     registry = load_registry()
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
     try:
-        subjects = subjects_named(registry, name, KINDS)
+        subjects = subjects_named(registry, name)
     except UnknownNameError as error:
         wrong = [f"{row.entry_point}: {row.reason}" for row in registry.failures] + list(map(str, registry.refused))
         if not wrong:
@@ -85,7 +87,7 @@ def command(
     operator = TerminalOperator(yes=yes)
     reports = []
     for one in subjects:
-        report = run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator)
+        report = run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator, root=root)
         reports.append(report)
         if out is not None and one.kind == "sensor":
             _keep(out, one, report)

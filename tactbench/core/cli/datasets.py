@@ -15,12 +15,17 @@ def command(shape: str) -> None:
 
     `tactbench run --dataset NAME` fetches what is missing, once. One that is not public in this form needs --root.
     """
+    from tactbench.core.errors import ConfigError
     from tactbench.core.recording.datasets import cache, datasets
     from tactbench.core.tables.terminal import remark
 
     records = []
     for name, one in datasets().items():
-        source = one.source
+        try:
+            source = one.source
+        except ConfigError as error:
+            remark(f"{name} cannot be used: {error}")
+            continue
         records.append(
             {
                 "name": name, "sensor": one.mapping.sensor.name, "measured": source.measured,

@@ -13,7 +13,8 @@ KINDS = ("sensor", "rig", "task", "estimator", "effect")
 NAME = r"[a-z][a-z0-9]*(-[a-z0-9]+)*"
 _TESTED_WITH = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
                 "estimator": "--sensor ideal --task force --estimator",
-                "effect": "--sensor ideal --task force --effects", "sensor": "--task force --sensor"}  # fmt: skip
+                "effect": "--sensor ideal --task force --effects",
+                "sensor": "--task contact-location --sensor"}  # fmt: skip
 
 
 @click.command(name="new")

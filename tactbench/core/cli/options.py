@@ -50,8 +50,8 @@ RESULTS = click.option("--out", type=click.Path(path_type=Path), default=DEFAULT
 
 EFFECTS = click.option(
     "--effects", metavar="LIST",
-    help="Force effects in or out: +creep,-drift; groups and +all, -all too. A plain name enables an effect of another "
-    "package.",
+    help="Force effects in or out: +creep,-drift; groups and +all, -all too. With a plain name an "
+    "effect of another package takes part where a scene calls for it.",
 )  # fmt: skip
 SIMULATION = options(
     EFFECTS,

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import io
 import os
+import random
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
@@ -15,13 +18,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn, get_args
 
+import numpy as np
+
 from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
-Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
+EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
+KINDS = EVERY_KIND[:-1]
+"""Of what hooks give; a data set is a file."""
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""
@@ -37,6 +44,10 @@ HEAVY = frozenset({
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
 })  # fmt: skip
 """Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
+
+
+IMPORT_S, THREAD_S = 1.0, 1.0
+"""How long the import of a plugin may take [s of a processor], and how long a thread may take to end."""
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -71,6 +82,8 @@ class CheckOutcome(NamedTuple):
     """What is wrong, or why it was skipped."""
     advice: str = ""
     """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
+    seconds: float | None = None
+    """How long it took; None: it was stopped, or not tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +93,7 @@ class Subject:
     kind: Kind
     name: str
     module: str
-    """The plugin's, as its entry point names it."""
+    """The plugin's, as its entry point names it; of a data set the mapping file."""
     distribution: str
     registry: Registry
     recording: Path | None = None
@@ -89,6 +102,8 @@ class Subject:
     """What is opened in the mode `invasive`."""
     operator: Operator | None = None
     """Who stands at the rig in the mode `invasive`."""
+    root: Path | None = None
+    """A folder that holds the files of a data set."""
 
     @cached_property
     def descriptor(self) -> Any:
@@ -179,6 +194,8 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
+        if isinstance(error, KeyError) and subject.kind == "sensor" and hasattr(subject.spec, "parameters"):
+            field = f"spec.parameters{sorted(subject.spec.parameters)}, {field}"
         raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
 
 
@@ -209,23 +226,66 @@ def code_names_resolve(subject: Subject) -> None:
             fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
 
 
+_STATES: dict[str, Callable[[], Any]] = {
+    "the seed of numpy's global generator": lambda: np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
+    "the seed of Python's global generator": lambda: random.getstate()[1][:-1],
+    "how numpy treats floating-point errors": np.geterr,
+    "the current folder": os.getcwd,
+}
+"""What all code of a process shares."""
+
+
+@contextmanager
+def unchanged(subject: Subject) -> Iterator[None]:
+    """Fail where a plugin's code changes what it shares with all others, prints, or lets a thread of a driver run on.
+
+    A generator that is seeded has other words of state; one that is drawn from keeps them, for the first 624 draws
+    from position 0. Libraries draw some.
+    """
+    state = np.random.get_state(legacy=False)  # noqa: NPY002
+    state["state"]["pos"] = 0
+    np.random.set_state(state)  # noqa: NPY002
+    version, (*own, _), following = random.getstate()
+    random.setstate((version, (*own, 0), following))
+    before, threads = {name: repr(state()) for name, state in _STATES.items()}, set(threading.enumerate())
+    with redirect_stdout(io.StringIO()) as printed, np.errstate():
+        yield
+        changed = [name for name, state in _STATES.items() if repr(state()) != before[name]]
+    if changed:
+        fail(subject.package, f"its code changes {changed[0]}: draw from a generator of your own, and set nothing")
+    if printed.getvalue():
+        fail(subject.package, f"its code prints {printed.getvalue()[:40]!r}: results of commands go to stdout")
+    for thread in set(threading.enumerate()) - threads if subject.kind in ("sensor", "device") else ():
+        thread.join(THREAD_S)
+        if thread.is_alive():
+            fail(subject.package, f"the thread {thread.name} runs on: end it in close()")
+
+
 @check(*KINDS)
 def import_is_light(subject: Subject) -> None:
     """The module of an entry point is imported by every command, also by one that only lists names.
 
-    Move imports of large packages into the module that the descriptor names, or into functions.
+    Move imports of large packages into the module that the descriptor names, or into functions; compute and read
+    nothing there.
     """
-    heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
+    took, *modules = _imported_with(subject.module)
+    heavy = sorted(HEAVY.intersection(modules))
     if heavy:
         fail(subject.module, f"its import also imports {', '.join(heavy)}")
+    if float(took) > IMPORT_S:
+        fail(subject.module, f"its import takes {float(took):.2g} s of a processor, and every command waits for it")
 
 
 @lru_cache(maxsize=64)
 def _imported_with(module: str) -> list[str]:
-    """Return the modules of a fresh interpreter with one; what tactbench itself imports is not heavy."""
+    """Return how long the import of a module takes [s of a processor], and the modules of an interpreter with it.
+
+    What tactbench itself imports is neither counted nor heavy.
+    """
     path = os.pathsep.join(part for part in sys.path if part)
+    code = f"import sys, time, tactbench.plugin.devices; a = time.process_time(); import {module}; "
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", f"import sys, {module}; print(*sys.modules)"],
+        [sys.executable, "-W", "ignore", "-c", f"{code}print(time.process_time() - a, *sys.modules)"],
         env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
     )  # fmt: skip
     if done.returncode != 0:

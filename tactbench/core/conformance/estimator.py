@@ -12,7 +12,11 @@ from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 
 Answer = Callable[[Any], Any]
 
-ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 90, 30, 4, 3, 1
+ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 400, 40, 7, 3, 1
+FEW_ROWS = 40
+"""Of few shots: a protocol that teaches a handful of presses gives no more."""
+LEVEL = 5.0
+"""Mean of the answers: forces do not lie about 0."""
 BETTER = 0.9
 """Of the error of the mean (or of the commonest class), that an answer which uses the features stays below: the
 question is linear with a tenth of noise, so that the worst of ours is at half."""
@@ -21,15 +25,15 @@ SAME_ROW = 1e-6
 
 
 def question(kind: str) -> list[Any]:
-    """Return X, y, new X and new y of a question that four features answer; the last column is constant."""
+    """Return X, y, new X and new y of a question that some of the features answer, the last most; one is constant."""
     rng = np.random.default_rng(0)
     X = rng.normal(size=(ROWS + NEW_ROWS, FEATURES))
-    y = X @ np.array([2.0, -1.0, 0.5, 0.0]) + 0.2 * rng.normal(size=len(X))
+    y = LEVEL + X @ np.array([0.5, 0.0, 0.0, 0.0, 0.0, -1.0, 2.0]) + 0.2 * rng.normal(size=len(X))
     X[:, 3] = 7.0  # a dead taxel
     if kind == "classification":
-        y = np.digitize(y, (-1.0, 1.0)).astype(np.int64)
+        y = np.digitize(y, (LEVEL - 1.0, LEVEL + 1.0)).astype(np.int64)
     if kind == "events":  # which frames hold one
-        y = (y > 0).astype(np.int64)
+        y = (y > LEVEL).astype(np.int64)
     return [X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]]
 
 
@@ -65,6 +69,7 @@ def answers_have_the_shape(subject: Subject) -> None:
         for name, now, old in zip(("fit: X", "fit: y", "predict: X"), given, question(kind), strict=False):
             if not np.array_equal(now, old):
                 fail(name, "it was changed in place")
+        _taught(subject, kind, given=[one[:FEW_ROWS] for one in given], place=f"{FEW_ROWS} rows: ")
     descriptor = subject.descriptor
     for name, candidates in descriptor.grid.items():
         for one in candidates:
@@ -88,6 +93,9 @@ def seed_and_data_decide(subject: Subject) -> None:
         drawn = subject.descriptor.looks_at == "nothing"
         if not drawn and not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
             fail("predict", "a row asked alone is answered otherwise than among others")
+        fewer = _taught(subject, kind, given=(X[: -ROWS // 4], y[: -ROWS // 4]))(new)
+        if kind == "regression" and not subject.descriptor.baseline and np.array_equal(fewer, together):
+            fail("fit", f"the last quarter of {ROWS} rows makes no difference to any answer")
         _taught(subject, kind, given=(-X, y[::-1].copy()))
         if not np.array_equal(_taught(subject, kind)(new), together):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
@@ -110,5 +118,7 @@ def it_learns(subject: Subject) -> None:
             error, bar = np.sqrt(np.mean((given - truth) ** 2)), np.sqrt(np.mean((y.mean() - truth) ** 2))
         else:
             error, bar = np.mean(given != truth), np.mean(np.bincount(y).argmax() != truth)
+        if kind == "regression" and np.array_equal(given, np.round(given)):
+            fail("predict", "its answers are whole numbers, and the targets are not")
         if not error < BETTER * bar:
             fail("predict", f"{kind}: its error is {error:.3g}, that of the trivial answer {bar:.3g}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, get_args
 
@@ -21,12 +23,13 @@ from tactbench.core.conformance.streams import (
     times_are_right,
     within_limits,
 )
-from tactbench.core.errors import nearest
+from tactbench.core.errors import UsageError, nearest
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.interfaces import Reason
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.rigs import rig_context
-from tactbench.core.samples import Quality
+from tactbench.core.samples import FloatArray, Quality
+from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
@@ -44,10 +47,18 @@ NOISE_N = 0.005
 """Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
 MOST_SATURATED = 0.5
 """Share of the samples of a press over the task's range that a taxel may stand at a limit."""
+LEAST_RISE = 0.02
+"""Share of its whole change by which a channel goes on in the upper part of its range (assumed: foams harden)."""
 ALWAYS_WANTED = ("stored", "reference-force")
 """What every recording needs, beside the kinds of channels that are observed."""
 REACH_MM = 15.0
 """Half of the side of the plane over which heights are looked at: no skin here is wider."""
+EFFECT_N = 2.0
+"""At the end of a press with an effect: some begin with a load."""
+ASKED = 8
+"""How often an effect is asked whether a scene calls for it: what is drawn then shows."""
+FLAT = 2e-3
+"""Share of its largest dimension by which a body rises at least as far from its lowest point as that dimension."""
 LOWEST_MM = 1e-9
 """By which the lowest point may miss 0: rounding of millimetres, and nothing that a skin feels."""
 MOST_N = 100.0
@@ -69,9 +80,56 @@ def tiny_scene(end_n: float = FORCE_N, **changes: Any) -> Scene:
 
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
-    """Return the first simulated rig, built, those that come with this package before others."""
+    """Return the first simulated rig, built, those that come with this package before others.
+
+    An effect that is checked is watched while it is applied.
+    """
     descriptor = subject.registry.rigs[subject.registry.first_rig("simulated")]
-    return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
+    context = rig_context(subject.registry)
+    if subject.kind == "effect":
+        _WATCHED.update(effect=subject.descriptor, wrong="", changed=False)
+        watching = {"where": f"{__name__}:watched"}
+        effects, named = (
+            tuple(one.model_copy(update=watching) if one.name == subject.name else one for one in several)
+            for several in (context.effects, context.named_effects)
+        )
+        context = replace(context, effects=effects, named_effects=named)
+    return load_object(descriptor.where)(context), descriptor
+
+
+_WATCHED: dict[str, Any] = {}
+"""The effect that is watched, what it does wrong, and whether it changes anything."""
+
+
+def watched(run: Any, *more: Any) -> Any:
+    """Apply the effect that is watched, and look at what it leaves alone and what it changes."""
+    effect = _WATCHED["effect"]
+    if not hasattr(run, "tracks"):  # called upon while solving
+        return load_object(effect.where)(run, *more)
+
+    def state() -> dict[str, Any]:
+        tracks = run.tracks
+        return {
+            "true force (load)": [run.load.force_n, *(one.force_n for one in tracks)],
+            "reference (reference-force)": [run.reference_n],
+            "clock": [run.t_s, *(one.t_s for one in tracks)],
+            "readings": [one.readings for one in tracks],
+            "marks": [one.quality for one in tracks],
+        }
+
+    before = {name: [one.copy() for one in arrays] for name, arrays in state().items()}
+    load_object(effect.where)(run)
+    for name, arrays in state().items():
+        same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before[name], arrays, strict=True))
+        if name in ("readings", "marks"):
+            _WATCHED["changed"] |= not same
+        elif not same and not any(f"({token})" in name for token in effect.produces):
+            _WATCHED["wrong"] = f"it changes the {name.partition(' (')[0]}, which its `produces` does not name"
+    for track in run.tracks:
+        bad = np.isnan(track.readings) & ((track.quality & Quality.MISSING) == 0)
+        if bad.any():
+            _WATCHED["wrong"] = f"{track.channels[int(bad.any(axis=0).argmax())].name} is not a number after it"
+    return None
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
@@ -85,13 +143,13 @@ def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
     return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
 
 
-def presses(subject: Subject, scenes: Sequence[Scene], field: str) -> Iterator[Recorded]:
+def presses(subject: Subject, scenes: Sequence[Scene], field: str, seed: int = 1) -> Iterator[Recorded]:
     """Yield what every simulated sensor and scene that go with each other give."""
     rig, descriptor = simulated_rig(subject)
     for scene in scenes:
         for sensor in simulated_sensors(subject):
             with suppress(CheckSkipped), code_of(field, subject):
-                yield carried_out(rig, sensor, descriptor, scene)
+                yield carried_out(rig, sensor, descriptor, scene, seed)
 
 
 def _pressed_by_tasks(registry: Registry) -> Iterator[float]:
@@ -101,12 +159,19 @@ def _pressed_by_tasks(registry: Registry) -> Iterator[float]:
             yield from (planned.scene.profile.largest_n for planned in owned.descriptor.spec.scenes)
 
 
+def _own_range_n(subject: Subject) -> float:
+    """Return up to which force [N] a sensor answers by its data sheet; 0: it does not say, or beyond any finger's."""
+    stated = getattr(subject.spec, "data_sheet", None) and subject.spec.data_sheet.force_range
+    upper_n = 0.0 if stated is None else stated.upper * units.conversion(stated.unit, "N")
+    return upper_n if upper_n <= MOST_N else 0.0
+
+
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press: of a sensor on a simulated rig over the range of tasks of force, or of a rig, a tiny one."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        end_n = max(_pressed_by_tasks(subject.registry), default=FORCE_N)
+        end_n = _own_range_n(subject) or max(_pressed_by_tasks(subject.registry), default=FORCE_N)
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
@@ -146,10 +211,29 @@ def limits_are_kept(subject: Subject) -> None:
             within_limits(where, channel, values)
             full = (marks_of(stream)[:, column] & Quality.SATURATED) != 0
             if subject.kind == "sensor" and channel.kind == "taxel" and full.mean() > MOST_SATURATED:
-                fail(
-                    where,
-                    f"{full.mean():.0%} of its samples stand at a limit in a press over the range of tasks of force",
-                )
+                fail(where, f"{full.mean():.0%} of its samples stand at a limit in a press over its range of forces")
+    _rises_to_the_end(subject, made)
+
+
+def _rises_to_the_end(subject: Subject, made: Recorded) -> None:
+    """Fail where no taxel goes on changing in the upper part of the range that a sensor's data sheet states."""
+    upper_n = _own_range_n(subject) if subject.kind == "sensor" else 0.0
+    if not upper_n:
+        return
+    pressing, force_n = pressing_force(made.came, made.meta.reference)
+    rises = []
+    for stream in made.came.values():
+        if stream.t_ns is None or pressing.t_ns is None or stream is pressing:
+            continue
+        load = np.interp(stream.t_ns, pressing.t_ns, force_n) / upper_n
+        low, mid, high = (stream.data[(load > one) & (load < one + 0.2)].astype(float) for one in (0.0, 0.6, 0.85))
+        if len(low) and len(mid) and len(high):
+            noise = 3 * np.hypot(mid.std(axis=0) / math.sqrt(len(mid)), high.std(axis=0) / math.sqrt(len(high)))
+            whole, late = (np.abs(high.mean(axis=0) - one.mean(axis=0)) for one in (low, mid))
+            rises.append(bool((late > np.maximum(LEAST_RISE * whole, np.where(whole > noise, 0.0, np.inf))).any()))
+    if rises and not any(rises):
+        text = f"no channel changes any more between {0.7 * upper_n:.3g} and {upper_n:.3g} N, its own range"
+        fail("spec.data_sheet.force_range", text)
 
 
 @check("rig", needs="press-is-recorded")
@@ -174,27 +258,34 @@ def differing(one: Recorded, other: Recorded) -> list[str]:
     return [name for name, stream in one.came.items() if stream.data.tobytes() != other.came[name].data.tobytes()]
 
 
-def _effected(subject: Subject) -> Recorded:
+def _effected(subject: Subject, seed: int = 1) -> Recorded:
     """Return a tiny press with the effect asked for by name, and those of its distribution that it consumes.
 
-    It slides, under force control, on a sensor that is colder than the indenter; plainly where no sensor may.
+    It slides, under force control, on a sensor that is colder than the indenter; plainly where no sensor may; on the
+    first sensor of which it changes a reading, or else on the first.
     """
     siblings = (one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution)
     words = [one.descriptor.name for one in siblings if set(subject.descriptor.consumes) & set(one.descriptor.produces)]
     sensors = simulated_sensors(subject)
     plain = tiny_scene(
-        observe=tuple(dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())),
-        simulation=Simulation(effects=(*words, f"+{subject.name}")),
-    )
+        end_n=EFFECT_N, observe=tuple(dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())),
+        simulation=Simulation(effects=(*words, f"+{subject.name}")), unit="2",
+    )  # fmt: skip
     warm = plain.environment.model_copy(update={"indenter_temperature": assumed(40.0, "degC", WHY)})
     slide = Slide(speed=assumed(10.0, "mm/s", WHY), start=assumed(SECONDS / 2, "s", WHY))
     full = plain.model_copy(update={"drive": ForceLoop(), "environment": warm, "slide": slide})
     for sensor in sensors:
         with code_of("called_for", subject):
-            reason = subject.code("called_for")(full, sensor.spec)
-        if not isinstance(reason, Reason) or not reason.text:
-            fail("called_for", f"it returned {reason!r}, and a Reason(called_for, text, change) is needed")
-    found = next(presses(subject, (full, plain), "where"), None)
+            reasons = [subject.code("called_for")(full, sensor.spec) for _ in range(ASKED)]
+        if not isinstance(reasons[0], Reason) or not reasons[0].text:
+            fail("called_for", f"it returned {reasons[0]!r}, and a Reason(called_for, text, change) is needed")
+        if len(set(reasons)) > 1:
+            fail("called_for", "it returns another reason for the same scene and sensor")
+    found = None
+    for made in presses(subject, (full, plain), "where", seed):
+        found = found or made
+        if _WATCHED["changed"]:
+            return made
     return skip("no simulated sensor and scene go with it") if found is None else found
 
 
@@ -212,13 +303,29 @@ def it_is_applied(subject: Subject) -> None:
     if not wanted.intersection(produced):
         close = nearest(produced[0], wanted) if produced else []
         fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
+    unknown = sorted(
+        set(subject.descriptor.consumes) - {one for each in subject.registry.effects for one in each.produces}
+    )
+    if unknown:
+        fail(f"consumes[{unknown[0]}]", "no installed effect produces it")
     made = _effected(subject)
+    plain = {*get_args(ChannelKind), "disturbance", "reading", "stored"}.issuperset(produced)
+    if plain and _WATCHED["wrong"]:
+        fail("where", _WATCHED["wrong"])
+    if plain and not _WATCHED["changed"]:
+        fail("where", "no reading is another one after it: does it change a copy, or an amount that is 0?")
     (entry,) = [one for one in made.meta.plan if one.effect == subject.name]
     if not (entry.included or entry.asked):  # the solve may leave out what it was lent and did not need
         fail("produces", "it was asked for by name, and the plan left it out: nothing needs what it produces")
     changed = differing(made, _effected(subject))
     if changed:
         fail(f"where: {changed[0]}", "another press with the same seed gives other samples")
+    second = _effected(subject, seed=2)
+    for module in [one for one in sys.modules if one.partition(".")[0] == subject.package != "tactbench"]:
+        del sys.modules[module]
+    changed = differing(second, _effected(subject, seed=2))
+    if changed:
+        fail(f"where: {changed[0]}", "imported anew it gives other samples: it keeps something of recordings before")
 
 
 @check("indenter", needs="code-names-resolve")
@@ -228,17 +335,49 @@ def indenter_is_pressed(subject: Subject) -> None:
     Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
     body is; choose defaults with flanks of up to 45 degrees.
     """
-    line = np.linspace(-REACH_MM, REACH_MM, 61)
     numbers = subject.descriptor.dimensions
-    with code_of("where", subject):
-        sizes = {name: one.default for name, one in numbers.items()}
-        found = np.asarray(subject.code("where")(line[:, None], line[None, :], **sizes))
-    if found.shape != (61, 61) or not np.isfinite(found).all():
-        fail("where", f"for places of shapes (61, 1) and (1, 61) it returned shape {found.shape}, or no finite heights")
+    sizes = {name: one.default for name, one in numbers.items()}
+    lengths = [one.default * units.conversion(one.unit, "mm") for one in numbers.values()
+               if units.parse(one.unit)[1] == units.parse("mm")[1]]  # fmt: skip
+    reach_mm = max(REACH_MM, *(2.5 * one for one in lengths), 0.0)
+    line = np.linspace(-reach_mm, reach_mm, 61)
+
+    def heights(**changed: float) -> FloatArray:
+        x_mm, y_mm = line[:, None].copy(), line[None, :].copy()
+        with code_of("where", subject):
+            found = np.asarray(subject.code("where")(x_mm, y_mm, **{**sizes, **changed}))
+        if not (np.array_equal(x_mm[:, 0], line) and np.array_equal(y_mm[0], line)):
+            fail("where", "it changes x_mm or y_mm in place")
+        if found.shape != (61, 61) or not np.isfinite(found).all():
+            text = f"for places of shapes (61, 1) and (1, 61) it returned shape {found.shape}, or no finite heights"
+            fail("where", f"{text}, with {changed or sizes}")
+        return found
+
+    found = heights()
     if abs(found[30, 30]) > LOWEST_MM or found.min() < -LOWEST_MM:
         fail("where", f"it is {found[30, 30]:g} mm high at (0, 0), at least {found.min():g} mm: 0 is needed")
-    units = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
-    scene = tiny_scene(indenter=Indenter(shape=subject.name, dimensions=units))
+    if not np.array_equal(found, heights()):
+        fail("where", "it gives other heights for the same places when it is called again")
+    for name, one in numbers.items():
+        others = {max(one.least, share * one.default or share) for share in (0.7, 1.4)}
+        others = {value if one.most is None else min(value, one.most) for value in others} - {one.default}
+        changes = []
+        for value in others:
+            with suppress(UsageError):  # dimensions that do not go with each other
+                changes.append(not np.array_equal(heights(**{name: value}), found))
+        if changes and not any(changes):
+            fail(f"dimensions[{name}]", "the heights are the same whatever it is")
+    away = np.hypot(line[:, None], line[None, :])
+    largest_mm, body = max(lengths, default=0.0), found > LOWEST_MM
+    if largest_mm and found[away <= 1.5 * largest_mm].max() < FLAT * largest_mm:
+        text = f"{found[away <= 1.5 * largest_mm].max():.2g} mm high within {1.5 * largest_mm:g} mm"
+        fail("where", f"{text}, 1.5 of its largest dimension: are x_mm and y_mm read in millimetres?")
+    if body.any() and body[(away > 0) & (away <= away[body].max())].all() and not body[0].any():
+        fail(
+            "where", f"its height is 0 again beyond {away[body].max():.3g} mm: 50 mm or more is needed where no body is"
+        )
+    dimensions = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
+    scene = tiny_scene(indenter=Indenter(shape=subject.name, dimensions=dimensions))
     next(presses(subject, (scene,), "where"))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -10,14 +11,21 @@ from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import (
     Recorded,
     good,
+    limits_of,
     pressing_force,
     rate_is_right,
     read_back,
     within_limits,
 )
+from tactbench.core.samples import StreamData
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.sensor import SensorSpec
 
-LARGEST_N = 1000.0
-"""No fingertip is pressed with more; a press of 10 N in gram-force reads 1020."""
+LARGEST_N, MOST_N, LOADED = 1000.0, 100.0, 0.2
+"""No fingertip is pressed with more, nor for half of the time; a press of 10 N in gram-force reads 1020. Loaded is what
+has this share of the largest force."""
+FAR, FAR_IN_RANGE = 1.0, 0.25
+"""Spans of its readings, and shares of its range, by which a channel's stated rest may lie beyond them."""
 CLEAR = 0.5
 """Correlation of a taxel with the force from which on its sign can be told."""
 
@@ -47,11 +55,20 @@ def recording_fits_the_spec(subject: Subject) -> None:
         fail("meta.sensor.streams", f"the sensor has no channel {min(strange)}")
     if wrong:
         fail("file", wrong)
+    fits(meta, data, spec)
+
+
+def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) -> None:
+    """Fail where a recording shows forces beyond a finger's, or another rate, range, rest or sign than `spec`."""
     pressing = None
-    if any(channel.kind == "force" for one in meta.reference if one.name in data for channel in one.channels):
+    known = [channel for one in meta.reference if one.name in data for channel in one.channels]
+    if any(channel.kind == "force" and channel.name in ("fz", "normal") for channel in known):
         pressing, force_n = pressing_force(data, meta.reference)
-        if np.nanmax(np.abs(force_n)) > LARGEST_N:
-            fail("reference", f"it reaches {np.nanmax(np.abs(force_n)):.4g} N: are these gram-force?")
+        size_n = np.abs(force_n[np.isfinite(force_n)])
+        loaded = size_n[size_n > LOADED * size_n.max(initial=0.0)]
+        if len(loaded) and (size_n.max() > LARGEST_N or np.median(loaded) > MOST_N):
+            text = f"{np.median(loaded):.4g} N (median while loaded), {size_n.max():.4g} N at most"
+            fail("reference", f"{text}: are these gram-force?")
     for stated in spec.streams:
         if stated.name not in data:
             continue
@@ -59,17 +76,24 @@ def recording_fits_the_spec(subject: Subject) -> None:
         own_rate = stated.name in meta.own_rates_hz or (meta.simulated and meta.emulation is None)
         rate_is_right(f"spec.streams[{stated.name}]", stream, None if own_rate else stated.rate_hz)
         for column, channel in enumerate(stream.spec.channels):
-            sign, values = limits[channel.name].sign, good(stream)[:, column]
+            own, values = limits[channel.name], good(stream)[:, column]
             where = f"spec.streams[{stated.name}].channels[{channel.name}]"
-            within_limits(where, limits[channel.name], values)
+            within_limits(where, own, values)
+            there = values[np.isfinite(values)]
+            if own.rest is not None and len(there):
+                rest, low, high = own.rest.to(own.unit), there.min(), there.max()
+                apart = max(low - rest, rest - high)
+                ends = [one for one in limits_of(own) if np.isfinite(one)]
+                if apart > max(FAR * (high - low), FAR_IN_RANGE * (np.ptp(ends) if ends else 0.0)):
+                    fail(f"{where}.rest", f"{rest:g} is stated, and it reads {low:g} to {high:g}")
             if channel.kind != "taxel" or stream.t_ns is None or pressing is None or pressing.t_ns is None:
                 continue
             felt = np.interp(stream.t_ns, pressing.t_ns, force_n)
-            there = np.isfinite(values) & np.isfinite(felt)
-            if there.any() and np.ptp(values[there]) > 0 and np.ptp(felt[there]) > 0:
-                likeness = float(np.corrcoef(values[there], felt[there])[0, 1])
-                if likeness * sign < -CLEAR:
-                    fail(f"{where}.sign", f"{sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
+            whole = np.isfinite(values) & np.isfinite(felt)
+            if whole.any() and np.ptp(values[whole]) > 0 and np.ptp(felt[whole]) > 0:
+                likeness = float(np.corrcoef(values[whole], felt[whole])[0, 1])
+                if likeness * own.sign < -CLEAR:
+                    fail(f"{where}.sign", f"{own.sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
 
 
 @check("sensor", mode="recording", needs="recording-fits-the-spec")

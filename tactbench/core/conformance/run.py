@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,10 +15,11 @@ from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their ch
     task,
     estimator,
     recorded,
+    data_set,
 )
 from tactbench.core.conformance.check import (
     CHECKS,
-    KINDS,
+    EVERY_KIND,
     Check,
     CheckFailed,
     CheckOutcome,
@@ -25,12 +28,14 @@ from tactbench.core.conformance.check import (
     Mode,
     Subject,
     line_in,
+    unchanged,
 )
-from tactbench.core.errors import UnknownNameError, error_text
+from tactbench.core.errors import TimedOut, UnknownNameError, error_text
 from tactbench.core.on_demand import contributed
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
+from tactbench.core.recording.datasets import mapping_called, mappings_of
 
 for _checks in contributed("tactbench.checks").values():
     _checks.load()
@@ -87,7 +92,7 @@ class CheckReport:
         return "\n".join([*(f"{one.check}: {one.where}: {one.text}" for one in self.failed), self.summary])
 
 
-def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS) -> list[Subject]:
+def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
     """Return what is called `name`: descriptors of that name, or else all that a plugin of that name brings.
 
     Raises
@@ -96,15 +101,19 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS)
         If nothing is called so, and no plugin that failed to load.
     """
     families, rows = registry.families(), plugins_named(registry, name)
-    every = [(kind, one) for kind in kinds for one in families[f"{kind}s"].names()]
+    every = [(kind, one) for kind in kinds if kind != "dataset" for one in families[f"{kind}s"].names()]
     brought = {one for row in rows for one in row.brings}
+    mapping = mapping_called(name) if "dataset" in kinds else None
+    files = [mapping] if mapping else [file for row in rows if not row.brings for file in mappings_of(row.module)]
+    data_sets = [Subject("dataset", file.stem, str(file), "", registry) for file in files]
     found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
-    if not found and not any(row.status == "failed" for row in rows):
+    if not found and not data_sets and not any(row.status == "failed" for row in rows):
         raise UnknownNameError(
             "plugin", name, {one for _, one in every} | {row.entry_point for row in registry.plugins}
         )
     owned = [(kind, one, families[f"{kind}s"].owned(one)) for kind, one in found]
-    return [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
+    plain = [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
+    return plain + data_sets
 
 
 def plugins_named(registry: Registry, name: str) -> list[PluginRow]:
@@ -124,6 +133,7 @@ def run_checks(
     recording: Path | None = None,
     rig_file: Path | None = None,
     operator: Operator | None = None,
+    root: Path | None = None,
     isolated: bool = True,
     without: Collection[str] = (),
 ) -> CheckReport:
@@ -137,20 +147,24 @@ def run_checks(
         What the modes `recording` and `invasive` read.
     operator
         Who stands at the rig in the mode `invasive`; None: nobody.
+    root
+        A folder that holds the files of a data set.
     isolated
         Whether in a child process; else in this one, for plugins that are trusted. Checks of the mode `invasive` are
         always run in this one, and without a limit of time: an interrupt must reach the rig.
     without
         Names of checks that are left out.
     """
-    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator)
+    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator, root=root)
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
-                outcomes[name] = CheckOutcome(name, "failed", subject.module, error_text(given))
+                late = isinstance(given, TimedOut)
+                text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
+                outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
     here = _Trier(subject, outcomes)
@@ -176,14 +190,17 @@ class _Trier:
             if before.status != "passed":
                 text = before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed"
                 return CheckOutcome(name, "skipped", "", text)
+        began_s = time.perf_counter()
         try:
-            one.run(self.subject)
+            with unchanged(self.subject) if one.mode == "passive" else nullcontext():
+                one.run(self.subject)
+            outcome = CheckOutcome(name, "passed")
         except CheckFailed as failure:
             advice = "" if failure.__cause__ is not None else one.cure
-            return CheckOutcome(name, "failed", failure.where, failure.text, advice)
+            outcome = CheckOutcome(name, "failed", failure.where, failure.text, advice)
         except CheckSkipped as reason:
-            return CheckOutcome(name, "skipped", "", str(reason))
+            outcome = CheckOutcome(name, "skipped", "", str(reason))
         except (Exception, SystemExit) as error:
             line = line_in(self.subject.package, error.__traceback__) or self.subject.module
-            return CheckOutcome(name, "failed", line, error_text(error))
-        return CheckOutcome(name, "passed")
+            outcome = CheckOutcome(name, "failed", line, error_text(error))
+        return outcome._replace(seconds=round(time.perf_counter() - began_s, 3))

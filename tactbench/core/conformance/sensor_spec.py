@@ -11,7 +11,7 @@ from tactbench.core.conformance.check import Subject, check, fail, skip
 from tactbench.core.conformance.streams import limits_of
 from tactbench.core.spec import units
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec, Vector
-from tactbench.core.spec.skin import SkinSheet
+from tactbench.core.spec.skin import BondedLayer, FoamPad, SkinSheet
 
 LARGEST_M = 0.5
 """Farthest distance of the outermost taxels [m]: the skin of a forearm is 0.3 m long."""
@@ -21,7 +21,15 @@ OF_KIND = {
 }  # fmt: skip
 """A unit of what a kind of channel measures."""
 RAW = ("count", "V", "mV")
-FASTEST_HZ, SLOWEST_HZ, LATEST_S = 1e6, 0.1, 10.0
+FASTEST_HZ, SLOWEST_HZ = 1e6, 0.1
+SOONEST_S, LATEST_S = 20e-6, 0.25
+"""Least and largest delay of a link (assumed: a word on an SPI bus takes some microseconds, a radio link 0.1 s)."""
+SPREAD, FEW = 0.2, 3
+"""Share of the skin's longer side that the taxels' longer side has at least, and places from which that is told."""
+PRESS_N, PRESS_MM = 1.0, 2.5
+"""A press of a flat punch of this radius: a fingertip's contact."""
+LEAST_MM = 1e-3
+"""By which such a press indents any skin that is soft enough to be one."""
 EDGE_MM = 1e-6
 """Rounding of a position in metres."""
 UNIT_NORMAL = 1e-3
@@ -57,9 +65,10 @@ def limits_are_in_order(subject: Subject) -> None:
         if rate_hz is not None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
             period = f"; is it a period? One of {rate_hz:g} s is {1 / rate_hz:g} Hz" if rate_hz < 1 else ""
             fail(f"spec.streams[{rated.name}].rate_hz", f"{rate_hz:g} Hz{period}")
-    delay = subject.spec.link_delay
-    if delay is not None and not 0 <= delay.to("s") <= LATEST_S:
-        fail("spec.link_delay", f"{delay} is not within 0 to {LATEST_S:g} s")
+    delay, slowest_hz = subject.spec.link_delay, min(one.rate_hz or 100.0 for one in subject.spec.streams)
+    latest_s = max(LATEST_S, 2 / slowest_hz)
+    if delay is not None and delay.to("s") != 0 and not SOONEST_S <= delay.to("s") <= latest_s:
+        fail("spec.link_delay", f"{delay} is not 0, nor within {1e6 * SOONEST_S:g} us to {1e3 * latest_s:g} ms")
     for place, stream, channel in _channels(subject):
         unit = OF_KIND.get(channel.kind)
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
@@ -97,6 +106,12 @@ def places_are_on_the_skin(subject: Subject) -> None:
         unit = "millimetres" if sheet is None or far_m > 200 * size_m else "inches"
         text = f"{far_m:g} m from the origin of a sensor that reaches {1e3 * size_m:.3g} mm: are these {unit}?"
         fail(f"{place}.position_m", text)
+    spots = np.array(sorted({one for _, channel, one in placed if channel.kind == "taxel"}))
+    if sheet is not None and len(spots) >= FEW:
+        ends = np.array([on_sheet_mm(sheet, tuple(one)) for one in spots])
+        spread, side = float(np.ptp(ends, axis=0).max()), max(high - low, 2 * half)
+        if spread < SPREAD * side:
+            fail("spec.streams.channels.position_m", f"taxels lie within {spread:.3g} mm of a skin of {side:g} mm")
     places: dict[Vector, tuple[str, str]] = {}
     ahead = None
     for place, channel, position_m in placed:
@@ -119,6 +134,25 @@ def places_are_on_the_skin(subject: Subject) -> None:
 
 
 @check("sensor")
+def skin_yields_as_skins_do(subject: Subject) -> None:
+    """A modulus of another power of ten makes a sensor that feels everything, or nothing, and looks plausible.
+
+    State young in the unit of its source (1 MPa is 1000 kPa), and the thickness in millimetres.
+    """
+    skin = subject.spec.skin
+    if not isinstance(skin, BondedLayer | FoamPad):
+        skip("it states no layer that a press indents by itself")
+    young_mpa, thick_mm = skin.young.to("MPa"), skin.thickness.to("mm")
+    # The softer of two bounds from above: a column below the punch, and a half-space of the same modulus under it
+    # (Boussinesq's punch, Poisson's ratio left out: it changes this by a quarter).
+    column_mm = PRESS_N * thick_mm / (young_mpa * math.pi * PRESS_MM**2)
+    depth_mm = min(column_mm, PRESS_N / (2 * PRESS_MM * young_mpa))
+    if not LEAST_MM <= depth_mm <= thick_mm:
+        text = f"{skin.young} and {skin.thickness}: {PRESS_N:g} N on a punch of {PRESS_MM:g} mm indents it by "
+        fail("spec.skin.young, thickness", f"{text}{depth_mm:.2g} mm, and it is {thick_mm:g} mm thick")
+
+
+@check("sensor")
 def nuisances_are_in_its_units(subject: Subject) -> None:
     """Amounts are added to readings as they are: volts on a channel of counts are off by its whole scale.
 
@@ -131,6 +165,9 @@ def nuisances_are_in_its_units(subject: Subject) -> None:
         if not spec.channels(kind):
             kinds = sorted({channel.kind for channel in spec.channels()})
             fail(f"spec.nuisances[{kind}]", f"it has no {kind} channel; it has {', '.join(kinds)}")
+        device = spec.data_sheet.exists or any(np.dtype(one.dtype).kind in "iu" for one in spec.streams)
+        if device and nuisances.white.value == nuisances.step.value == 0:
+            fail(f"spec.nuisances[{kind}]", "white and step are both 0: every reading is exact; state one of them")
         for field in nuisances.model_fields_set - {"creep"}:
             amount = getattr(nuisances, field)
             share = field.endswith("_scatter") or field in ("unit_gain", "offset_smooth")

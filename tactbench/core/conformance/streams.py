@@ -96,7 +96,8 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
         shapes = {name: column.shape for name in COLUMNS if (column := getattr(whole, name)) is not None}
         if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
             fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
-        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence)
+        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence,
+                                      device_ns=whole.device_ns)  # fmt: skip
         are_finite(where, found[spec.name])
     return found
 
@@ -138,6 +139,7 @@ def times_are_right(where: str, stream: StreamData, seconds: float, late: float,
     off_s = 0.0 if ended_ns is None else (float(t_ns[-1]) - ended_ns) * 1e-9
     if abs(off_s) > OFF_S:
         fail(f"{where}.t_ns", f"it is {off_s:+.3g} s off the host's clock; the device's own belongs into device_ns")
+    late += 2 / (seconds * stream.spec.rate_hz) if stream.spec.rate_hz else 0.0  # a row at either end
     if not abs(spans / seconds - 1) <= late:
         fail(f"{where}.t_ns", f"it spans {spans:.3g} s, and {seconds:.3g} s have passed")
     rate_is_right(where, stream, stream.spec.rate_hz)

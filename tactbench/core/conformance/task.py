@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
-from tactbench.core.conformance.press import SECONDS, WHY, presses, tiny_scene
+from tactbench.core.conformance.press import MOST_N, SECONDS, WHY, presses, tiny_scene
 from tactbench.core.conformance.sensor_spec import OF_KIND
 from tactbench.core.errors import nearest
 from tactbench.core.spec import units
-from tactbench.core.spec.quantity import assumed
+from tactbench.core.spec.quantity import Quantity, assumed
+from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, TaskSpec
 
+REFERENCE = ("force", "torque", "position")
+"""Kinds of channels of which references are made: among the features they give labels away."""
+PARTS = ("indenter", "placement", "profile", "slide", "environment")
+"""Of a scene, that a label may be about."""
+LEAST_SCENES = 5
+"""From so many scenes, or labels, it is no chance that a number rises with a label."""
+LEAST_M, LARGEST_M = 1e-5, 1.0
+"""Radii of caps that are pressed on a sensor."""
+LEAST_FORCE = 0.05
+"""Of a target's unit, that scenes reach at least."""
 GROUPS = ("recording", "unit", "trial", "press", "object", "block")
 """Groups beside labels that recordings have or that mappings of this package give them."""
 
@@ -34,9 +49,11 @@ def names_are_known(subject: Subject) -> None:
     from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 
     spec = subject.spec
+    missing = sorted(set(get_args(Role)) - {planned.role for planned in spec.scenes}) if spec.scenes else []
     with code_of("spec.protocols", subject):
         for name in spec.protocols:
-            protocol_called(name)
+            if protocol_called(name).roles_only and missing:
+                fail("spec.protocols", f"{name} chooses on recordings of the role {missing[0]}; no scene has it")
     labels = {label for _, planned in _planned(spec) for label in planned.scene.labels}
     known = {*SPLITS_WITHOUT_GROUPS, *GROUPS, *spec.campaigns, *labels}
     for name in spec.splits:
@@ -85,8 +102,9 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
     """
     spec = subject.spec
     kind = getattr(spec.target, "kind", None)
-    if kind in spec.features:
-        fail("spec.features", f"it holds {kind}, which is the target's kind")
+    given_away = sorted({*spec.features, *spec.optional_features} & {kind, *REFERENCE})
+    if given_away:
+        fail("spec.features", f"it holds {given_away[0]}, the target's kind or one that the reference records")
     classes: dict[str, set[object]] = {}
     for place, planned in _planned(spec):
         scene = planned.scene
@@ -111,11 +129,120 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
     if missing:
         fail("spec.scenes", f"none has the role {missing[0]}, which the split `roles` needs")
     taught = classes.get("train", set())
+    if spec.kind == "regression" and len(taught) == 1:
+        fail("spec.scenes", f"role train teaches one value alone: {min(map(str, taught))}")
+    _scenes_differ(spec)
+    if isinstance(spec.target, LabelTarget):
+        _label_is_one_thing(spec, spec.target)
     if spec.kind == "classification" and taught:
         for role, found in classes.items():
             if found - taught or len(taught) < 2:
                 strange = ", ".join(sorted(map(str, found - taught))) or "one class alone"
                 fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
+
+
+def _scenes_differ(spec: TaskSpec) -> None:
+    """Fail where a test repeats what was taught, or where every session of the tests is one of training."""
+    of_role: dict[str, dict[str, Scene]] = {}
+    for planned in spec.scenes if "roles" in spec.splits else ():
+        same = planned.scene.model_copy(update={"name": "", "starts_after_s": 0.0})
+        of_role.setdefault(planned.role, {})[planned.scene.name] = same
+    tests, training = of_role.get("test", {}), of_role.get("train", {})
+    for name, scene in tests.items():
+        twins = [other for other, one in training.items() if one == scene]
+        if twins:
+            fail(
+                f"spec.scenes[{name}]", f"it is {twins[0]} once more, in the same session: the test is what was taught"
+            )
+    sessions = {one.session for one in tests.values()}
+    if sessions and len(spec.scenes) > 2 and sessions <= {one.session for one in training.values()}:
+        fail("spec.scenes.session", f"every test session is one of training: {', '.join(sorted(sessions))}")
+
+
+def _leaves(given: Any, way: str) -> Iterator[tuple[str, Any]]:
+    """Yield the numbers (SI) and texts of a scene's part by their places."""
+    if isinstance(given, Quantity):
+        yield way, given.value * units.parse(given.unit)[0]
+    elif isinstance(given, BaseModel):
+        for name in type(given).model_fields:
+            yield from _leaves(getattr(given, name), f"{way}.{name}")
+    elif isinstance(given, Mapping):
+        for name, one in given.items():
+            yield from _leaves(one, f"{way}.{name}")
+    elif isinstance(given, str | int | float):
+        yield way, given
+
+
+def _label_is_one_thing(spec: TaskSpec, target: LabelTarget) -> None:
+    """Fail where a label goes with two parts of the scenes, so that either gives it away, or is in another unit."""
+    found = [(planned.scene.labels[target.name], planned.scene) for planned in spec.scenes]
+    labels = [label for label, _ in found]
+    told: dict[str, str] = {}
+    for part in PARTS:
+        columns = [dict(_leaves(getattr(scene, part), part)) for _, scene in found]
+        for way in columns[0] if columns else ():
+            values = [column.get(way) for column in columns]
+            if len(set(values)) < 2:
+                continue
+            if _go_together(labels, values):
+                told.setdefault(part, way)
+            if spec.kind == "regression" and (spec.metric in ("rmse", "mae") or "unit" in target.model_fields_set):
+                unit = target.unit if "unit" in target.model_fields_set else spec.unit
+                _in_its_unit(target.name, unit, way, labels, values)
+    if len(found) >= LEAST_SCENES and len(told) > 1:
+        text = f"{target.name} goes with {' and with '.join(told.values())}: either gives it away"
+        fail("spec.scenes", f"{text}; vary one of them independently")
+
+
+def _go_together(labels: Sequence[Any], values: Sequence[Any]) -> bool:
+    """Return whether each label has values of its own: numbers that rise with it, or fall, or one stretch of them."""
+    numbers = all(isinstance(one, int | float) for one in (*labels, *values))
+    if not numbers:
+        return len(set(zip(labels, values, strict=True))) == len(set(values)) == len(set(labels))
+    if len(set(labels)) < LEAST_SCENES:  # classes
+        runs = [label for label, _ in itertools.groupby(label for _, label in sorted(zip(values, labels, strict=True)))]
+        return len(runs) == len(set(labels))
+    pairs = sorted(set(zip(labels, values, strict=True)))
+    steps = [b[1] - a[1] for a, b in itertools.pairwise(pairs)]
+    return len(pairs) == len(set(labels)) and (min(steps) > 0 or max(steps) < 0)
+
+
+def _in_its_unit(name: str, unit: str, way: str, labels: Sequence[Any], values: Sequence[Any]) -> None:
+    """Fail where labels are a quantity of the scenes times a power of ten."""
+    pairs = [(label, value) for label, value in zip(labels, values, strict=True) if value]
+    if len(pairs) < 2 or not all(isinstance(one, int | float) for pair in pairs for one in pair):
+        return
+    factors = [label * units.parse(unit)[0] / value for label, value in pairs]
+    power = math.log10(abs(factors[0])) if factors[0] else 0.0
+    alike = all(math.isclose(one, factors[0], rel_tol=1e-6) for one in factors)
+    if alike and len({label for label, _ in pairs}) > 1 and abs(power) > 0.5 and abs(power - round(power)) < 1e-6:
+        label, value = pairs[0]
+        fail(f"spec.scenes.labels[{name}]", f"{label:g} {unit} where {way} is {value:g} (SI): which unit?")
+
+
+@check("task")
+def scenes_can_be_pressed(subject: Subject) -> None:
+    """One scene of a hundred that cannot be carried out ends a campaign when the others are recorded.
+
+    Name installed shapes with dimensions of theirs, and state forces in newtons and lengths in millimetres.
+    """
+    spec = subject.spec
+    if not spec.scenes:
+        skip("it has no scenes: recordings made elsewhere answer it")
+    for place, planned in _planned(spec):
+        body, force_n = planned.scene.indenter, planned.scene.profile.largest_n
+        with code_of(f"{place}.indenter", subject):
+            if body.shape is not None:
+                subject.registry.indenters[body.shape].sizes(body.dimensions)
+        if body.radius is not None and not LEAST_M <= body.radius.to("m") <= LARGEST_M:
+            fail(f"{place}.indenter.radius", f"{body.radius} is not within {1e3 * LEAST_M:g} to {1e3 * LARGEST_M:g} mm")
+        if force_n > MOST_N:
+            fail(f"{place}.profile", f"its largest force is {force_n:g} N: is its unit right?")
+        if (
+            getattr(spec.target, "kind", "") == "force"
+            and force_n / units.conversion(spec.target.unit, "N") < LEAST_FORCE
+        ):
+            fail("spec.target.unit", f"{force_n:g} N at most is little in {spec.target.unit}: are newtons meant?")
 
 
 @check("task", needs="answers-are-in-the-scenes")

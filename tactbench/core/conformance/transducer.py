@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+import re
+from contextlib import suppress
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +13,7 @@ import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.sensor_spec import on_sheet_mm
-from tactbench.core.conformance.streams import limits_of
+from tactbench.core.conformance.streams import likely, limits_of
 from tactbench.core.samples import FloatArray, SkinGrid, SkinState
 from tactbench.core.spec.sensor import ChannelSpec, Nuisances
 from tactbench.core.spec.skin import FluidBackedShell, SkinSheet
@@ -28,6 +30,8 @@ REST_SHARE, REST_COUNTS = 0.01, 1.0
 AS_STRONG = 0.5
 """A taxel that answers with this share of the strongest answer may be the one that is pressed: taxels differ in gain,
 and currents or foam carry a press to their neighbours. Swapped or mirrored axes leave a thousandth."""
+SHARES = (0.1, 1.5)
+"""Of a load, that channels in newton may sum to: taxels leave gaps, and some overlap (assumed)."""
 SHEAR_FIELDS = "reads_shear names no kind of channel, so tangential_displacement_mm and shear_mpa are None"
 
 
@@ -69,9 +73,12 @@ def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> Fl
         with code_of("transducer", subject), np.errstate(all="ignore"):
             given = np.asarray(transducer(state))
     except CheckFailed as failure:
-        if "NoneType" in failure.text and not subject.spec.reads_shear:
-            raise CheckFailed(f"spec.reads_shear, {failure.where}", f"{SHEAR_FIELDS}: {failure.text}") from failure
-        raise
+        if state.shear_mpa is None:
+            sheared = np.zeros((2, *state.pressure_mpa.shape))
+            with suppress(Exception):
+                transducer(replace(state, shear_mpa=sheared, tangential_displacement_mm=sheared))
+                failure = CheckFailed(f"spec.reads_shear, {failure.where}", f"{SHEAR_FIELDS}: {failure.text}")
+        raise failure from failure.__cause__
     if given.shape != (len(names),) or given.dtype.kind not in "fiu":
         fail("transducer", f"{given.dtype} of shape {given.shape} for {len(names)} channels asked for")
     bad = [name for name, value in zip(names, given, strict=True) if not np.isfinite(value)]
@@ -229,6 +236,7 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
     def named(place: Place) -> str:
         return f"{observed(subject)[sites[place][0]].name} (x {place[0]:.3g} mm, arc {place[1]:.3g} mm)"
 
+    _moves_along(subject, sites)
     for at_mm in responses:
         answering = {there: strength(at_mm, there) for there in sites}
         felt = {there: strength(there, at_mm) for there in responses}
@@ -239,6 +247,43 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
             most = max(strengths, key=strengths.__getitem__)
             if strengths[at_mm] < AS_STRONG * strengths[most] and math.dist(most, at_mm) > near_mm:
                 fail("transducer", text.format(here=named(at_mm), most=named(most)))
+
+
+def _moves_along(subject: Subject, sites: dict[Place, list[int]]) -> None:
+    """Fail where the answer does not move the way a press does, from one end of the taxels to the other, or across."""
+    places = np.array(list(sites))
+    rest, ends = _read(subject, _state(subject, 0.0)), (places.min(axis=0), places.max(axis=0))
+    for axis, name in enumerate(("x", "the arc")):
+        middle = (ends[0] + ends[1]) / 2
+        if ends[1][axis] - ends[0][axis] < patch_mm(skin_grid(subject.spec.skin.sheet)) / 2:
+            continue
+        centres = []
+        for end in ends:
+            at = tuple(end[axis] if one == axis else middle[one] for one in (0, 1))
+            change = np.abs(_read(subject, _state(subject, GENTLE_N, at)) - rest)
+            weights = np.array([change[columns].max() for columns in sites.values()])
+            if not weights.any():
+                break
+            centres.append(weights @ places / weights.sum())
+        else:
+            if (centres[1] - centres[0])[axis] <= 0:
+                text = f"pressed further along {name}, its answer moves back: is {name} mirrored, or are axes swapped?"
+                fail("transducer", text)
+
+
+@check("sensor", needs="it-answers-to-a-press")
+def forces_are_the_forces(subject: Subject) -> None:
+    """Channels in newton are compared with the load itself: a lost factor is a sensor a hundred times too good.
+
+    Sum pressure over area: 1 MPa on 1 mm2 is 1 N, a gram-force 0.0098 N.
+    """
+    columns = [column for column, one in enumerate(observed(subject)) if one.unit == "N"]
+    if not columns:
+        skip("none of its channels is in N")
+    sums = [abs(change[columns].sum()) / GENTLE_N for change in _responses(subject, GENTLE_N).values()]
+    share = float(np.median(sums))
+    if not SHARES[0] <= share <= SHARES[1]:
+        fail("transducer", f"its channels sum to {share:.3g} N under {GENTLE_N:g} N{likely(share)}")
 
 
 @check("sensor", needs="it-answers-to-a-press")
@@ -273,12 +318,26 @@ def shear_turns_with_its_direction(subject: Subject) -> None:
     if not subject.spec.reads_shear:
         skip("its spec names no kind of channel that reads shear")
     plain, felt = _read(subject, _state(subject, GENTLE_N)), False
-    for axis, (x, s) in {"x": (SHEAR, 0.0), "s": (0.0, SHEAR)}.items():
+    of_axis = {axis: [column for column, one in enumerate(observed(subject)) if axis in axes_named(one.name)]
+               for axis in "xy"}  # fmt: skip
+    newtons = all(one.unit == "N" for one in observed(subject))
+    moved: dict[str, dict[str, float]] = {}
+    for axis, (x, s) in {"x": (SHEAR, 0.0), "y": (0.0, SHEAR)}.items():
         there, back = (_read(subject, _state(subject, GENTLE_N, None, one)) - plain for one in ((x, s), (-x, -s)))
         most = int(np.argmax(np.abs(there) + np.abs(back)))
         felt |= bool(there[most] or back[most])
         if there[most] * back[most] > 0:
             text = f"dragged along {axis} it changes by {there[most]:+.3g}, dragged back by {back[most]:+.3g}"
             fail(f"channel {observed(subject)[most].name}", text)
+        moved[axis] = {one: float(np.abs(there[columns]).sum()) for one, columns in of_axis.items()}
+        if newtons and there[of_axis[axis]].sum() < 0:
+            fail("transducer", f"dragged along {axis}, its {axis} channels fall: is a sign turned?")
     if not felt:
-        fail("spec.reads_shear", "dragged along x or s, no channel changes")
+        fail("spec.reads_shear", "dragged along x or y, no channel changes")
+    if moved["x"]["x"] * moved["y"]["y"] < moved["x"]["y"] * moved["y"]["x"]:
+        fail("transducer", "dragged along x its y channels change more, and along y its x channels: are axes swapped?")
+
+
+def axes_named(name: str) -> str:
+    """Return the axes that a channel's name has as a word of their own, or behind f or b: ``x1``, ``t3_x``, ``Bx``."""
+    return "".join(re.findall(r"(?:^|(?<=[^a-z]))[fb]?([xyz])(?=[^a-z]|$)", name.lower()))

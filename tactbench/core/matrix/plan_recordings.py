@@ -26,9 +26,11 @@ from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_of
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.progress import Progress
 from tactbench.core.spec.declared_task import DeclaredTask
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.rig import RigDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.task import TaskSpec, in_drawn_order
+from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget, in_drawn_order
 
 if TYPE_CHECKING:
     from tactbench.core.recording.datasets import DataSet
@@ -190,10 +192,42 @@ def plan_run(
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry)
     for cell in cells:
         _check_split(registry.tasks[cell.task].spec, cell.split)
-    return cells, {
-        key: RecordingSource([request.path for request in made], made, None if made else _no_scenes(key, matrix))
-        for key, made in requests_for(cells, registry, keys, store, rig_file).items()
-    }
+    plan: RecordingPlan = {}
+    for key, made in requests_for(cells, registry, keys, store, rig_file).items():
+        trouble = _unanswerable(key, registry, rig, rig_file) or (None if made else _no_scenes(key, matrix))
+        plan[key] = (
+            RecordingSource((), trouble=trouble) if trouble else RecordingSource([one.path for one in made], made)
+        )
+    reasons = {str(one.trouble) for one in plan.values()}
+    if plan and not rig.simulated and all(one.trouble is not None for one in plan.values()):
+        raise UsageError(f"Nothing is recorded: {'; '.join(sorted(reasons))}", hint="Choose another task or rig.")
+    return cells, plan
+
+
+def _unanswerable(
+    key: RequestKey, registry: Registry, rig: RigDescriptor, file: RigFile | None
+) -> NotApplicable | None:
+    """Return why a rig of real devices and a sensor cannot answer a task, by what their specs state; None: they may."""
+    spec, task = registry.sensors[key[0]].spec, registry.tasks[key[1]].spec
+    if rig.simulated or rig.references is None:  # a simulated rig says so itself, and nobody presses for it
+        return None
+    kinds = {channel.kind for channel in spec.channels()}
+    if not kinds & {*task.features, *task.optional_features}:
+        needed = " or ".join(task.features)
+        return NotApplicable(f"Task {task.name!r} needs channels of kind {needed}; {spec.name} has none.", hint="")
+    wanted: list[tuple[str, str | None]] = []
+    if isinstance(task.target, SlipTarget):
+        wanted = [("position", "slip")]
+    elif not isinstance(task.target, LabelTarget):
+        parts = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
+        wanted = [(one.kind, one.name) for one in parts]
+    for kind, name in wanted:
+        names = rig.references.get(kind)
+        lacking = names is None or (kind in ("force", "torque") and file is not None and file.force is None)
+        if lacking or (names and name is not None and name not in names):
+            what = f"{kind} {name or ''}".strip()
+            return NotApplicable(f"Task {task.name!r} asks for {what}; the rig {rig.name} records none.", hint="")
+    return None
 
 
 def _from_replay(

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast, get_args
 
@@ -24,6 +26,7 @@ from tactbench.core.errors import (
     PluginError,
     UnknownNameError,
     UsageError,
+    nearest,
 )
 from tactbench.core.plugins import hookspecs
 from tactbench.core.spec.rig import (
@@ -275,15 +278,20 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     PluginError
         If it does not keep the contract of its hooks; and whatever its own code raises.
     """
+    _check_api_version(point.value, _stated_version(point.value))
     module = cast(ModuleType, point.load())
     _check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
-    manager.check_pending()
     known = {f"tactbench_{family}" for family in _KINDS}
-    callers = manager.get_hookcallers(module)
-    if not callers:
+    for name in sorted(vars(module)):
+        close = nearest(name, known) if name.startswith("tactbench_") and name not in known else []
+        if close and hasattr(getattr(module, name), f"{hookspecs.GROUP}_impl"):
+            raise PluginContractError(f"{point.value}: there is no hook {name}.", hint=f"Is {close[0]} meant?")
+    manager.check_pending()
+    callers = manager.get_hookcallers(module) or []
+    if not callers and not _mappings_beside(module):
         raise PluginContractError(
             f"{point.value} implements none of {', '.join(sorted(known))}.",
             hint="Decorate a function of that name with tactbench.plugin.hookimpl.",
@@ -301,6 +309,24 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
                 )
         offered[family] = descriptors
     return offered
+
+
+def _mappings_beside(module: ModuleType) -> bool:
+    """Return whether a package brings mappings of data sets: see tactbench.core.recording.datasets."""
+    return any(any(Path(folder).glob("datasets/*.yaml")) for folder in getattr(module, "__path__", ()))
+
+
+def _stated_version(module: str) -> object:
+    """Return the version that the source of a module states by a number of its own; else this one.
+
+    It is looked at before the import, which may fail where another version is spoken.
+    """
+    spec = find_spec(module)
+    if spec is None or not (spec.origin or "").endswith(".py"):
+        return hookspecs.API_VERSION
+    text = Path(str(spec.origin)).read_text(encoding="utf-8", errors="replace")
+    found = re.search(r"^TACTBENCH_API\b[^=\n]*=\s*(\d+)", text, re.MULTILINE)
+    return int(found[1]) if found else hookspecs.API_VERSION
 
 
 def _check_api_version(module: str, written_for: object) -> None:

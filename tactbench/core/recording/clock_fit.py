@@ -34,6 +34,19 @@ LOWEST = 10
 _SLACK_NS = 1e-3
 """A residual below minus this lies below the line; float64 holds the residuals of a stretch to 1e-5 ns [derived]."""
 
+MOST_DRIFT, JITTER_NS = 1e-2, 100_000_000
+"""By which a device's clock may be faster or slower than the host's, a hundred times more than a quartz; and by how
+much stamps of the host may be late: a slope over a short time says no more (assumed)."""
+
+
+def wrong_rate(stream: str, drift: float, lasts_ns: int) -> str:
+    """Return what is wrong with a clock by the slope of its line over some time; empty: nothing can be told."""
+    if abs(drift) * lasts_ns / max(1.0, abs(drift)) < JITTER_NS or abs(drift) <= MOST_DRIFT:
+        return ""
+    units = {1e3: "microseconds", 1e6: "milliseconds", 1e9: "seconds"}
+    looks = next((f": are its times {unit}?" for factor, unit in units.items() if 0.5 < drift / factor < 2), "")
+    return f"a second of the clock of {stream} takes {1 + drift:.4g} s of the host's{looks}"
+
 
 def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegment:
     """Return the line below all points of a run; `stamps` are the device's and the host's times, (2, n), in order.

@@ -157,19 +157,20 @@ def cache() -> Path:
 def datasets() -> dict[str, DataSet]:
     """Return the data sets of all installed packages by name; a mapping without a source is none.
 
+    One whose file is wrong is among them, and raises ConfigError where its mapping is looked at.
+
     Raises
     ------
     DuplicateNameError
         If two packages bring one name.
-    ConfigError
-        If one of the files is wrong.
     """
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():
         for path in sorted(folder.glob("*.yaml"), key=lambda one: one.stem):
             one = DataSet(path)
-            if one.mapping.source is None:
-                continue
+            with suppress(ConfigError):
+                if one.mapping.source is None:
+                    continue
             if one.name in found:
                 raise DuplicateNameError("data set", one.name, (found[one.name][0], package))
             found[one.name] = package, one
@@ -177,13 +178,25 @@ def datasets() -> dict[str, DataSet]:
 
 
 def dataset_called(given: str) -> DataSet:
-    """Return the data set with a name, or of the mapping file `given`; raises UnknownNameError."""
+    """Return the data set of that name, or the one in the mapping file `given`; raises UnknownNameError."""
+    path = mapping_called(given)
+    if path is None:
+        raise UnknownNameError("data set", given, datasets())
+    return DataSet(path)
+
+
+def mapping_called(given: str) -> Path | None:
+    """Return the mapping file at a path, or of the data set of that name; None: there is none."""
     if given.endswith((".yaml", ".yml")):
-        return DataSet(Path(given))
-    for folder in _folders().values():
-        if (folder / f"{given}.yaml").is_file():
-            return DataSet(folder / f"{given}.yaml")
-    raise UnknownNameError("data set", given, datasets())
+        return Path(given)
+    files = (folder / f"{given}.yaml" for folder in _folders().values())
+    return next((path for path in files if path.is_file()), None)
+
+
+def mappings_of(module: str) -> list[Path]:
+    """Return the mapping files that the package of a plugin's module brings."""
+    folder = _folders().get(module.partition(".")[0])
+    return [] if folder is None else sorted(folder.glob("*.yaml"))
 
 
 def _folders() -> dict[str, Path]:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording import format as layout
+from tactbench.core.recording.clock_fit import wrong_rate
 from tactbench.core.recording.lag import FEWEST_ROWS, find_lag, windows
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
@@ -166,7 +167,9 @@ def examine(recording: Recording) -> list[Finding]:
             found.append(Finding("empty", "error", f"{name} has no rows", name))
             continue
         found.extend(_channels(stream))
-        found.extend(_rows(stream, recording.meta.clocks.get(name)))
+        found.extend(_rows(stream))
+        if name in recording.meta.clocks:
+            found.extend(_clock_fit(name, recording.meta.clocks[name], stream))
         if stream.t_ns is not None:
             streams[name] = stream
             clocks.setdefault(hashlib.sha256(stream.t_ns.data).digest(), ([], stream))[0].append(name)
@@ -259,7 +262,7 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
             yield finding("duplicated", "warning", np.isin(np.arange(len(there)), places), " identical")
 
 
-def _rows(stream: _Stream, clock: StreamClock | None) -> Iterator[Finding]:
+def _rows(stream: _Stream) -> Iterator[Finding]:
     for label, values in stream.labels.items():
         if len(values) == 1 and stream.rows > 1:
             text = f"label {label} is {next(iter(values))!r} in every row"
@@ -267,9 +270,16 @@ def _rows(stream: _Stream, clock: StreamClock | None) -> Iterator[Finding]:
     if stream.lost_before:
         text = f"{stream.name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
         yield Finding("rows-before-lost", "warning", text, stream.name, count=stream.lost_before)
-    if clock is not None and clock.breaks:
-        text = f"the clock of {stream.name} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", text, stream.name, count=clock.breaks)
+
+
+def _clock_fit(name: str, clock: StreamClock, stream: _Stream) -> Iterator[Finding]:
+    lasts_ns = 0 if stream.t_ns is None else int(stream.t_ns[-1]) - int(stream.t_ns[0])
+    wrong = [refused for one in clock.segments if (refused := wrong_rate(name, one.drift, lasts_ns))]
+    if wrong:
+        yield Finding("clock-rate", "error", wrong[0], name, count=len(wrong))
+    if clock.breaks:
+        text = f"the clock of {name} began again (times: {clock.breaks})"
+        yield Finding("clock-lost", "warning", text, name, count=clock.breaks)
 
 
 def _clock(stream: str, data: _Stream) -> Iterator[Finding]:

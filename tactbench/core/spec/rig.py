@@ -18,6 +18,18 @@ _NAME = r"^[a-z][a-z0-9_-]*$"
 EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
+class ManualFrame(Frozen):
+    """A frame of a byte stream, copied from the maker's manual.
+
+    A mistake that a driver and an emulator of one author share, as a byte order, shows against it alone.
+    """
+
+    data: str = Field(pattern=r"^([0-9A-Fa-f]{2}\s*)+$")
+    """In hexadecimal."""
+    readings: dict[str, float] = Field(min_length=1)
+    """What the manual says it holds: channel -> reading, in the channel's unit."""
+
+
 class SensorDescriptor(Frozen):
     """A sensor, and the places of its code."""
 
@@ -36,6 +48,8 @@ class SensorDescriptor(Frozen):
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """Options of the driver that only the papers of a real device state, with their values for the emulated device.
     They hold where a rig file leaves them out."""
+    manual_frame: ManualFrame | None = None
+    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
 
     effects: tuple[str, ...] = ()
     """Names of effects of other packages, or of the sensor's own, that are candidates wherever it is simulated."""
@@ -62,6 +76,8 @@ class DeviceDescriptor(Frozen):
     """The same as of a sensor."""
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """The same as of a sensor."""
+    manual_frame: ManualFrame | None = None
+    """The same as of a sensor."""
 
 
 class TaskDescriptor(Frozen):
@@ -86,6 +102,9 @@ class RigDescriptor(Frozen):
     """Whether rows from this rig are marked SIM, and are never ranked against hardware."""
     replays: bool = False
     """Whether it is a ReplayRig; one of these is used for ``--recordings`` without ``--rig``."""
+    references: dict[str, tuple[str, ...]] | None = None
+    """Kinds of channels that its reference records, each with their names where they are fixed. A task that needs
+    others is refused before anything is recorded. None: they are not known beforehand."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of a simulated rig's ladder of solvers, the cheapest first."""
     verification: str | None = Field(default=None, pattern=WHERE)

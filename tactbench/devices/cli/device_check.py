@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.core.conformance.streams import good, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.recording.clock_fit import ClockFit
+from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
 from tactbench.core.samples import Block, Quality, join_blocks
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.sensor import StreamSpec
@@ -164,6 +164,9 @@ def _problems(found: Record) -> list[str]:
         allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * rate_hz / rows
         if abs(rate_hz / stated_hz - 1) > allowed:
             problems.append(f"Stream {name} came at {rate_hz:.4g} Hz, stated are {stated_hz:.4g} Hz.")
+    if found["drift_ppm"] is not None and rate_hz:
+        refused = wrong_rate(name, 1e-6 * found["drift_ppm"], round(1e9 * rows / rate_hz))
+        problems += [f"{refused}. Correct device_ns in its driver."] if refused else []
     wrong = {"lost": found["lost"], "twice or late": found["twice_or_late"], **found["marked"]}
     told = [f"{number} {what}{_CAUSES.get(what, '')}" for what, number in wrong.items() if number]
     return [*problems, f"Stream {name}, of {rows} rows: {', '.join(told)}."] if told else problems

@@ -10,4 +10,9 @@ TACTBENCH_API = 2
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [RigDescriptor(name="bench", title="real devices, pressed by hand", where="tactbench.rigs.bench.rig:build")]
+    return [
+        RigDescriptor(
+            name="bench", title="real devices, pressed by hand", where="tactbench.rigs.bench.rig:build",
+            references={"force": (), "torque": ()},
+        )
+    ]  # fmt: skip

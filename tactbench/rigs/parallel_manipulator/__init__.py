@@ -47,6 +47,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
             name="parallel-manipulator",
             title="a linear motor on a delta manipulator presses under force control, guarded",
             where=f"{here}.rig:build",
+            references={"force": (), "torque": (), "position": ("position",)},
             file=f"{here}.settings:ManipulatorFile",
             check=f"{here}.rig_check:check",
             emulators=f"{here}.emulated_press:PressEmulators",

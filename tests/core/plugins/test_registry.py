@@ -117,12 +117,13 @@ BAD = {
     "raises": ("raise RuntimeError('no vendor library')", "RuntimeError: no vendor library"),
     "no-version": ("", "TACTBENCH_API"),
     "no-hook": (HEAD, "implements none"),
-    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "unknown hook.*tactbench_device"),
+    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "no hook.*tactbench_devices"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),
     "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), "ZeroDivisionError"),
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
     # Nothing of a plugin is used unless all of it is right.
     "another-kind": (f"{EVERYTHING}@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()", "not EffectD"),
+    "of-another-version": ("TACTBENCH_API = 99\nimport nothing_such", "states TACTBENCH_API = 99"),
     "aborts": ("import os; os.abort()", "signal 6"),
 }
 

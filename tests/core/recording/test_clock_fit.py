@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way
+from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way, wrong_rate
 from tactbench.core.spec.recording import StreamClock
 from tests.conftest import ROOT
 
@@ -55,3 +55,15 @@ def test_a_device_that_starts_again_and_one_that_pauses():
     # 1 ms of uniform delay over 500 points: the least are a few microseconds above the line.
     times = HostTimes(StreamClock(source="device", segments=fit.segments()))
     assert np.abs(times(device) - true).max() < 50_000
+
+
+@pytest.mark.parametrize(
+    ("per_second", "says"), [(S, ""), (S * 10001 // 10000, ""), (1_000_000, "microseconds"), (1000, "milliseconds"),
+                             (1, "seconds"), (S * 107 // 100, "takes 0.93")],
+)  # fmt: skip
+def test_a_clock_in_another_unit_or_of_another_rate_is_named(per_second, says):
+    host = np.arange(0, 10 * S, 10 * MS)
+    fit = ClockFit()
+    fit.add(host * per_second // S if per_second < S else host // 1000 * (per_second // 1_000_000), host)
+    found = wrong_rate("taxels", fit.segments()[-1].drift, int(host[-1]))
+    assert (says in found) if says else not found

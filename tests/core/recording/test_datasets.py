@@ -9,7 +9,9 @@ import pytest
 import yaml
 
 import tactbench
+from tactbench.core.conformance.run import run_checks, subjects_named
 from tactbench.core.errors import MissingRecordingError, NotApplicable
+from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
 from tactbench.core.study.shipped import matrix_called
 from tests.conftest import ROOT, Verbs
@@ -131,6 +133,21 @@ def test_a_plugin_brings_data_sets_as_files(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     assert {"pad", "eflesh-normal"} <= set(datasets())
     assert dataset_called("pad").source.citation == "nobody"
+
+
+def test_a_broken_one_costs_itself_alone_and_a_package_of_data_sets_is_a_plugin(tmp_path, monkeypatch):
+    described(tmp_path / "only_data" / "datasets")
+    (tmp_path / "only_data" / "datasets" / "broken.yaml").write_text("version: 1\n")
+    (tmp_path / "only_data" / "__init__.py").write_text("TACTBENCH_API = 2\n")
+    write_metadata(tmp_path, "only-data", "1", points="only = only_data")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert {"pad", "broken", "eflesh-normal"} <= set(datasets())
+    registry = load_registry()
+    (row,) = [one for one in registry.plugins if one.distribution == "only-data"]
+    assert (row.status, row.reason) == ("loaded", "")
+    broken, pad = (run_checks(one, isolated=False) for one in subjects_named(registry, "only"))
+    assert (broken.kind, broken.name, broken.ok) == ("dataset", "broken", False)
+    assert "force asks for a force, which no reference stream has" in str(pad)
 
 
 def test_one_that_cannot_be_had_costs_its_own_rows_of_a_task_that_both_declare(tmp_path, server):

@@ -56,3 +56,11 @@ def test_one_scene_is_recorded_and_a_terminal_is_asked_for_where_somebody_has_to
     assert refused.returncode != 0
     assert "Traceback" not in refused.stderr
     assert not (shell.folder / "none.h5").exists()
+
+
+def test_what_a_rig_cannot_answer_is_said_before_anything_is_recorded(shell):
+    asked = ("run", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--task")
+    for task, lacking in (("contact-location", "position x"), ("slip", "position slip")):
+        done = shell(*asked, task, code=2)
+        assert f"asks for {lacking}; the rig bench records none" in done.stderr
+    assert not list(shell.folder.rglob("*.h5"))

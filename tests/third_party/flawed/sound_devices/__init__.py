@@ -1,6 +1,15 @@
 """A pad of four taxels, a force sensor, a stage and an axis that moves, on serial lines."""
 
-from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
+from tactbench.plugin import (
+    ChannelSpec,
+    ManualFrame,
+    SensorDescriptor,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    assumed,
+    hookimpl,
+)
 from tactbench.plugin.devices import DeviceDescriptor
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
@@ -27,6 +36,7 @@ SPEC = SensorSpec(
     link_delay=assumed(2, "ms", WHY),
     nuisances={"taxel": Nuisances(white=assumed(1, "count", WHY), step=assumed(1, "count", WHY))},
 )  # fmt: skip
+FRAME = {"t1": 300.0, "t2": -120.0, "t3": 5.0, "t4": 2000.0}
 ON_THE_LINE = {"emulated_link": "bytes"}
 
 
@@ -34,6 +44,7 @@ ON_THE_LINE = {"emulated_link": "bytes"}
 def tactbench_sensors():
     return [SensorDescriptor(spec=SPEC, transducer="sound_devices.transduction:build",
                              driver="sound_devices.line:Pad", emulator="sound_devices.line:PadEmulator",
+                             manual_frame=ManualFrame(data="A5 07 2C 01 88 FF 05 00 D0 07 3C", readings=FRAME),
                              **ON_THE_LINE)]  # fmt: skip
 
 
