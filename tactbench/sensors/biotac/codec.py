@@ -43,10 +43,6 @@ STREAMING_INDEX = 16
 CHANNELS: tuple[str, ...] = tuple(channel.name for stream in STREAMS for channel in stream.channels)
 """The channels of the model with 19 electrodes, in the order of the spec's streams."""
 
-RESEND = b"\x20\x00"
-"""Asks for the last two bytes once more. The driver has 20; the manual prints 50, of even parity, against its own
-rule, so 20 is sent [derived]."""
-
 READ, WRITE = 0x61, 0x40
 """First byte of a command that reads or writes a property [sourced: both; writing: manual]."""
 
@@ -77,8 +73,6 @@ PROPERTIES: dict[str, Property] = {
     "flex version": Property(0x10, 2),
     "software version": Property(0x13, 4),
     "serial number": Property(0x15, 16),
-    "cpu speed": Property(0x61, 2),
-    "sampling frequency": Property(0x70, 2),
 }
 """All are read-only and sent without parity [sourced: manual, table 10; driver]."""
 

@@ -8,8 +8,7 @@ microcontroller that carries out batches by itself, ``docs/links.md``) or, less 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
 4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`); an adapter adds
 what it needs itself. Some batches are under way ahead of the one that runs, so that the host may be late by as many
-frames. Words are asked for once: what a batch does cannot depend on what it reads (the option `resends` asks for each
-word again, always).
+frames. Each word is requested once: the steps of a batch are fixed before its first reply arrives.
 
 **Times.** A bridge stamps each batch with its own microseconds: `device_ns` of a row is that stamp, counted on over its
 wraps, and the word's place in the batch; `t_ns` is when the reply was in the host, the same for all rows of a batch.
@@ -35,8 +34,8 @@ cable, port or bridge gone             the reading ends with LinkUnplugged
 A gap is never filled. Rows are raw counts.
 
 **Tested** against an emulator written from the same public sources, behind an emulated bridge. It has never met a real
-BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command, that
-a property is read with the pause of a sampling command, and that a resend needs the same pause.
+BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command and
+that a property is read with the pause of a sampling command.
 """
 
 from __future__ import annotations
@@ -91,7 +90,7 @@ class BioTacDriver(Driver):
     UsageError
         For options that are not known.
     RigError
-        If the link is no SPI link, or its clock is not one for a BioTac, or leaves no time for so many resends.
+        If the link is no SPI link, or its clock is not one for a BioTac.
     LinkError
         If the link cannot be opened.
     """
@@ -118,13 +117,12 @@ class BioTacDriver(Driver):
                 options.frame,
                 speed_hz=self._link.speed_hz,
                 select=options.select,
-                resends=options.resends,
                 words=options.batch_words,
             )
         except ValueError as error:
             raise RigError(
                 f"{self._link.address} is too slow for a BioTac: {error}.",
-                hint=f"Choose a faster clock, or fewer resends than {options.resends}.",
+                hint="Choose a faster clock.",
             ) from error
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
@@ -140,14 +138,12 @@ class BioTacDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when asked for again.
+        """Counts of faults by name and channel, such as ``parity E7``.
 
-        Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
-        the batch before) and ``frames not asked for`` (that would have had their time in between).
+        They include ``batches lost`` (no reply came), ``batches late`` (begun more than the time of a word after the
+        end of the previous batch) and ``frames not asked for`` (frames whose time passed in such a pause).
         """
-        now = Counter(counted(self._batches.faults))
-        now.update({f"resent {name}": n for name, n in self._batches.resent.items()})
-        return dict(self._counts + now)
+        return dict(self._counts + Counter(counted(self._batches.faults)))
 
     def identify(self) -> Mapping[str, str]:
         """Return serial number, flex version and software version as the maker's tools show them.

@@ -27,8 +27,6 @@ class BioTacOptions(Options):
     sensors may put numbers on its lines: 1, 2, 4 are the first three on the maker's [sourced: driver]."""
     frame: Annotated[tuple[str, ...], BeforeValidator(_names)] = DEFAULT_FRAME
     """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
-    resends: int = Field(default=0, ge=0, le=3)
-    """How often every word is asked for again, so that words of bad parity can be replaced."""
     batch_words: int | None = Field(default=None, ge=1, le=1000)
     """Words in a batch; None: a frame. Fewer where a bridge takes only short batches: a word is 14 bytes of payload."""
     batches_ahead: int = Field(default=8, ge=2, le=16)

@@ -24,12 +24,12 @@ HEAD, TAIL = 0x40, 0xC0
 """First byte of the frame with taxels 0 to 6, and of that with taxels 7 to 11 and the error word."""
 IN_HEAD = 7
 """Taxels in the head."""
-POLLING, OLD_SKIN, SKIN = 2, 3, 4
-"""Classes, bits 8 to 10 of an identifier. Class 3 also belongs to other analog sensors."""
+POLLING, SKIN = 2, 4
+"""Message classes, bits 8 to 10 of an identifier."""
 BROADCAST = 0xF
-"""Destination that every board takes as its own."""
+"""Destination address that every board accepts."""
 NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
-"""Low bits of the error word: some taxel gave no answer; the chip gave none; no source gives these a meaning."""
+"""Low bits of the error word: a taxel did not acknowledge; the chip did not answer; bits that no source explains."""
 
 
 @dataclass(frozen=True)
@@ -68,26 +68,6 @@ class Transmit:
 
 
 @dataclass(frozen=True)
-class OldSetup:
-    """Old set-up. MTB4 firmware takes its own defaults instead of the numbers, a new baseline, and *starts*, 40 ms."""
-
-    timer: int = 1
-    cdc_offset: int = 0x2000
-    time: int = 0
-
-
-@dataclass(frozen=True)
-class OldSetup2:
-    """Second half of the old set-up; unknown to MTB4 firmware."""
-
-    shift: int = 2
-    shift_3_1: int = 0x22
-    no_load: int = 240
-    param: int = 0
-    enabled: int = 0xFFFF
-
-
-@dataclass(frozen=True)
 class VersionRequest:
     """Ask for the firmware's version, naming the protocol that is needed: the only command with an answer."""
 
@@ -95,7 +75,7 @@ class VersionRequest:
     minor: int = 0
 
 
-Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | OldSetup | OldSetup2 | VersionRequest
+Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | VersionRequest
 
 
 @dataclass(frozen=True)
@@ -115,13 +95,9 @@ def polling_id(board: int, source: int = 0) -> int:
     return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
 
 
-def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
-    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15.
-
-    `old`: of class 3, as early firmware sends.
-    """
-    kind = OLD_SKIN if old else SKIN
-    return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
+def skin_id(board: int, triangle: int) -> int:
+    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15."""
+    return SKIN << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
 
 
 def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
@@ -147,10 +123,6 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
             numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
         case Transmit(on):
             numbers = [0x07, 0 if on else 1]
-        case OldSetup(timer, cdc, time):
-            numbers = [0x4C, 1, 1, timer, *_low_high(cdc), *_low_high(time)]
-        case OldSetup2(shift, shift_3_1, no_load, param, enabled_mask):
-            numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
         case VersionRequest(major, minor):
             numbers = [0x1C, major, minor]
     return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
@@ -168,10 +140,6 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
         found = TriangleSetup(data[0], data[1], data[2], bool(data[3] & 1), data[4] | data[5] << 8)
     elif code == 0x07 and data:
         found = Transmit(data[0] == 0)
-    elif code == 0x4C and len(data) >= 7:
-        found = OldSetup(data[2], data[3] | data[4] << 8, data[5] | data[6] << 8)
-    elif code == 0x4E and len(data) >= 6:
-        found = OldSetup2(data[0], data[1], data[2], data[3], data[4] | data[5] << 8)
     elif code == 0x1C and len(data) < 7:  # with 7 it is a board's answer
         found = VersionRequest(*(*data, 0, 0)[:2])
     else:
@@ -196,7 +164,7 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 
 
 def skin_frames(
-    board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
+    board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
     """Return head and tail.
 
@@ -215,7 +183,7 @@ def skin_frames(
     if len(taxels) != TAXELS:
         raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
     values = bytes(_within("a reading", value, 255) for value in taxels)
-    identifier = skin_id(board, triangle, old=old)
+    identifier = skin_id(board, triangle)
     errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
     return (
         CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
@@ -264,7 +232,7 @@ class Sample:
     quality: tuple[Quality, ...]
     """(12,)"""
     word: int | None
-    """Error word; None if the tail is missing, or that of old firmware, which has none."""
+    """Error word; None if the tail is missing."""
 
 
 @dataclass
@@ -280,8 +248,6 @@ class Counts:
     """Frames kept out because they came twice."""
     malformed: int = 0
     """Frames kept out for their length."""
-    without_word: int = 0
-    """Samples whose tail had no error word."""
     not_connected: int = 0
     no_ack: int = 0
     out_of_range: list[int] = field(default_factory=lambda: [0] * TAXELS)
@@ -298,7 +264,6 @@ class Counts:
             "halves far apart": self.far_apart,
             "frames doubled": self.doubled,
             "frames of wrong length": self.malformed,
-            "samples without error word": self.without_word,
             "samples not connected": self.not_connected,
             "samples not acknowledged": self.no_ack,
             "long intervals": self.long_intervals,
@@ -338,8 +303,6 @@ class SkinDecoder:
     ----------
     period_s
         The boards' period, seconds.
-    old_ids
-        Also take class 3, which other analog sensors on the bus share.
 
     Attributes
     ----------
@@ -354,12 +317,11 @@ class SkinDecoder:
         If the period is not positive. No frame makes `feed` raise.
     """
 
-    def __init__(self, period_s: float, *, old_ids: bool = False) -> None:
+    def __init__(self, period_s: float) -> None:
         if not period_s > 0:
             raise UsageError(f"A period of {period_s} s is not positive.", hint="Give the boards' period in seconds.")
         self.foreign = 0
         self._period_ns = 1e9 * period_s
-        self._classes = (OLD_SKIN, SKIN) if old_ids else (SKIN,)
         self._triangles: dict[tuple[int, int], _Triangle] = {}
 
     @property
@@ -370,14 +332,12 @@ class SkinDecoder:
     def feed(self, frame: CanFrame) -> list[Sample]:
         """Return the samples, at most two, that `frame` completes or proves incomplete."""
         data = frame.data
-        known = not frame.extended and 0 <= frame.id <= 0x7FF and frame.id >> 8 in self._classes
-        if not known or not data or data[0] not in (HEAD, TAIL):
+        if frame.extended or frame.id >> 8 != SKIN or not data or data[0] not in (HEAD, TAIL):
             self.foreign += 1
             return []
         key = (frame.id >> 4 & 0xF, frame.id & 0xF)
         triangle = self._triangles.setdefault(key, _Triangle())
-        # Old firmware's tail ends with taxel 11.
-        if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
+        if len(data) != 8:
             triangle.counts.malformed += 1
             return []
         head = triangle.head
@@ -422,7 +382,7 @@ class SkinDecoder:
             counts.long_intervals += 1
         triangle.last_ns = first.t_ns
         taxels = (head.data[1:] if head else bytes(IN_HEAD)) + (tail.data[1:6] if tail else bytes(TAXELS - IN_HEAD))
-        word = int.from_bytes(tail.data[6:]) if tail and len(tail.data) == 8 else None
+        word = int.from_bytes(tail.data[6:]) if tail else None
         marks = [Quality.SATURATED if value in (0, 255) else Quality.GOOD for value in taxels]
         for taxel in triangle.doubled:
             marks[taxel] |= Quality.SUSPECT
@@ -441,7 +401,6 @@ class SkinDecoder:
             marks = [Quality.MISSING] * TAXELS
         counts.missing_heads += head is None
         counts.missing_tails += tail is None
-        counts.without_word += tail is not None and word is None
         counts.no_ack += bool((word or 0) & NO_ACK)
         counts.not_connected += bool((word or 0) & NOT_CONNECTED)
         counts.samples += 1

@@ -66,9 +66,7 @@ class FingertipDriver(Driver):
         stream = next((one for one in settings.streams if one.name == STREAMS[0].name), STREAMS[0])
         rate = Source(tag="derived", reference=f"the board is set up for {1e3 * options.period_s:g} ms")
         self._stream = stream.model_copy(update={"rate_hz": 1 / options.period_s, "rate_source": rate})
-        self._ids = {skin_id(options.board, options.triangle)}
-        if options.old_setup:
-            self._ids.add(skin_id(options.board, options.triangle, old=True))
+        self._id = skin_id(options.board, options.triangle)
         self._sent: set[tuple[int, bytes]] = set()
         self._sampling = False
         self._earlier: Counter[str] = Counter()
@@ -116,7 +114,7 @@ class FingertipDriver(Driver):
                 return {**about, "model": model, "firmware": "{}.{}.{}".format(*version.firmware), "protocol": protocol}
         return {
             **about,
-            "firmware": f"no answer within {ANSWER_S:g} s: old firmware has none, or there is no such board",
+            "firmware": f"no answer within {ANSWER_S:g} s: firmware that does not answer, or no such board",
         }
 
     def start(self) -> None:
@@ -135,7 +133,7 @@ class FingertipDriver(Driver):
         until_ns = self._clock() + round(1e9 * SETTLE_S)
         while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
             with suppress(LinkTimeout):
-                self._link.receive(left_s)  # from before, or of the old set-up, which starts by itself
+                self._link.receive(left_s)  # frames sent before the set-up
         self._send(Transmit(on=True))
         self._sampling = True
 
@@ -175,7 +173,7 @@ class FingertipDriver(Driver):
         self._link.close()
 
     def _fresh_decoder(self) -> SkinDecoder:
-        return SkinDecoder(self._options.period_s, old_ids=self._options.old_setup)
+        return SkinDecoder(self._options.period_s)
 
     def _counted(self) -> Counter[str]:
         """Return what the decoder has counted; it is given frames of one triangle only."""
@@ -193,7 +191,7 @@ class FingertipDriver(Driver):
         """Return the samples that `frame` completes."""
         if not self._sampling:
             return []
-        if frame.id in self._ids and not frame.extended:
+        if frame.id == self._id and not frame.extended:
             return self._decoder.feed(frame)
         self._others += (frame.id, frame.data) not in self._sent
         return []

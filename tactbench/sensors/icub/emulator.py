@@ -37,7 +37,6 @@ from tactbench.sensors.icub.codec import (
     TAIL,
     TAXELS,
     BoardSetup,
-    OldSetup,
     Transmit,
     TriangleSetup,
     Version,
@@ -187,10 +186,6 @@ class Bus(DeviceEmulator):
                 self._start(now_s)
             case Transmit(on=False):
                 self._reads_s = math.inf
-            case OldSetup():
-                self._forget()
-                self._setup = replace(self._setup, period_ms=40)
-                self._start(now_s)
             case VersionRequest(major, minor):
                 fits = VERSION.protocol[0] == major and VERSION.protocol[1] >= minor
                 self._send([version_frame(self._board, replace(VERSION, fits=fits), to=piece.id >> 4 & 0xF)], now_s)

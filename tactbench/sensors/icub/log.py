@@ -14,7 +14,6 @@ from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
-    OLD_SKIN,
     SKIN,
     TAIL,
     BoardSetup,
@@ -50,19 +49,18 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         If no frames of such a fingertip are in it.
     """
     settings = read_options(LogOptions, options, "a log of icub")
-    classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
     halves: dict[tuple[int, int], list[CanFrame]] = {}
     commands = []
     frames, left_out = read_can_log(path)
     for frame in frames:
-        if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
+        if not frame.extended and frame.id >> 8 == SKIN and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
             halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
         elif (found := read_command(frame)) is not None:
             commands.append(found)
     board, triangle = _chosen(path, settings, sorted(halves), len(frames))
     half = halves[board, triangle]
     period_s, rate = _period(path, settings, half)
-    decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
+    decoder = SkinDecoder(period_s)
     samples = [sample for frame in half for sample in decoder.feed(frame)] + decoder.flush()
     if not samples:
         raise DataError(f"{path} has no whole frame of board {board}, triangle {triangle}.", hint="Record it again.")
@@ -105,14 +103,12 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
     if not fitting:
         raise DataError(
             f"{path} has no frames of that fingertip among its {frames} frames.",
-            hint=f"There are: {listed}."
-            if there
-            else "Frames of early firmware (class 3) are taken with the option old_ids=true.",
+            hint=f"The log has: {listed or 'no skin frames'}.",
         )
     if len(fitting) > 1:
         raise UsageError(
             f"{path} has frames of {len(fitting)} fingertips.",
-            hint=f"Choose one by the options board and triangle. There are: {listed}.",
+            hint=f"Choose one by the options board and triangle. The log has: {listed}.",
         )
     return fitting[0]
 

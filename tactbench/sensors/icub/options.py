@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tactbench.plugin.devices import Options
-from tactbench.sensors.icub.codec import BoardSetup, Command, OldSetup, OldSetup2, Transmit, TriangleSetup
+from tactbench.sensors.icub.codec import BoardSetup, Command, Transmit, TriangleSetup
 
 
 class FingertipOptions(Options):
@@ -32,30 +32,18 @@ class FingertipOptions(Options):
     """One count is ``2**shift`` results of the converter."""
     cdc_offset: int = Field(default=0x2000, ge=0, le=0xFFFF)
     """Of the converter, as the AD7147 takes it."""
-    old_setup: bool = False
-    """Set the board up by the old messages, and take frames of class 3, too: for early firmware."""
-
-    @model_validator(mode="after")
-    def _only_what_is_sent(self) -> Self:
-        """Refuse what the old messages do not carry: the type, and the period, for which no source states a unit."""
-        if self.old_setup and self.model_fields_set & {"skin_type", "period_ms"}:
-            raise ValueError("the old set-up has neither skin_type nor period_ms; leave them out")
-        return self
 
     @property
     def period_s(self) -> float:
-        """Seconds between samples; of the old set-up 40 ms, as MTB4 firmware takes it [sourced: icub-firmware]."""
-        return 0.04 if self.old_setup else 1e-3 * self.period_ms
+        """Seconds between samples."""
+        return 1e-3 * self.period_ms
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """What sets the board up, in order; afterwards it takes a baseline and does not send, MTB4's old set-up aside.
+        """Commands that set the board up, in order; afterwards the board takes a baseline and does not send.
 
-        [sourced: icub-main CanBusSkin.cpp, but for the stop at the beginning: the board may be sending]
+        [sourced: icub-main CanBusSkin.cpp; the stop at the beginning is added because the board may be sending]
         """
-        if self.old_setup:
-            halves = (OldSetup(cdc_offset=self.cdc_offset), OldSetup2(shift=self.shift, no_load=self.no_load))
-            return (Transmit(on=False), *halves)
         return (
             Transmit(on=False),
             BoardSetup(self.skin_type, self.period_ms, self.no_load),
@@ -72,5 +60,3 @@ class LogOptions(Options):
     """None: the only one in the log."""
     period_ms: int | None = Field(default=None, ge=1, le=255)
     """Milliseconds between samples; None: the median interval of the log."""
-    old_ids: bool = False
-    """Also take frames of class 3, which early firmware sends and other analog sensors share."""

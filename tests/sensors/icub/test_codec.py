@@ -10,8 +10,6 @@ from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BoardSetup,
-    OldSetup,
-    OldSetup2,
     SkinDecoder,
     Transmit,
     TriangleSetup,
@@ -42,8 +40,6 @@ COMMANDS = [
     ("t20E20700", Transmit(True)),
     ("t20E20701", Transmit(False)),
     ("t20F20701", Transmit(False)),
-    ("t20E84C01010100200000", OldSetup()),
-    ("t20E84E0222F000FFFF0A", OldSetup2()),
 ]
 """Lawicel text, which is identifier, length and data, and the command."""
 
@@ -58,7 +54,6 @@ PAIRS = """
     41F 40F0F0F0F0F0F0F0 C0F0F0F0F0F00001 SSSSSSSSSSSS
     4FF 4000000000000000 C00000000000FFF2 MMMMMMMMMMMM
     400 40FFFFFFFFFFFFFF C0FFFFFFFFFF0000 EEEEEEEEEEEE
-    3E3 40F0F0F0F0F0F0F0 C0F0F0F0F0F00000 GGGGGGGGGGGG
 """
 """Identifier, head and tail; quality of each taxel: good, at its end, out of range, suspect, missing."""
 MARKS = {"G": GOOD, "E": SATURATED, "R": SATURATED | SUSPECT, "S": SUSPECT, "M": MISSING}
@@ -99,15 +94,15 @@ def test_commands(text, command):
     assert read_command(wanted) == (identifier & 0xF, command)
 
 
-@pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 12)])
+@pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 11)])
 def test_pairs(line):
     number, head, tail, marks = line.split()
     identifier = int(number, 16)
     frames = frame(identifier, head), frame(identifier, tail)
-    board, triangle, old = identifier >> 4 & 0xF, identifier & 0xF, identifier >> 8 == 3
+    board, triangle = identifier >> 4 & 0xF, identifier & 0xF
     taxels, word = frames[0].data[1:] + frames[1].data[1:6], int(tail[-4:], 16)
-    assert skin_frames(board, triangle, taxels, word, old=old) == frames
-    decoder = SkinDecoder(PERIOD_S, old_ids=True)
+    assert skin_frames(board, triangle, taxels, word) == frames
+    decoder = SkinDecoder(PERIOD_S)
     assert decoder.feed(frames[0]) == []
     (sample,) = decoder.feed(frames[1])
     assert (sample.board, sample.triangle, sample.sequence) == (board, triangle, 0)
@@ -195,12 +190,12 @@ def test_frames_of_wrong_length_and_kind_are_kept_out():
 
 frames = st.builds(
     CanFrame,
-    st.one_of(st.integers(-1, 0x1FFFFFFF), st.sampled_from([0x4E3, 0x3E3, 0x20E, 0x2E0])),
+    st.one_of(st.integers(-1, 0x1FFFFFFF), st.sampled_from([0x4E3, 0x20E, 0x2E0])),
     st.one_of(
         st.binary(max_size=64),
         st.builds(
             lambda first, rest: bytes([first]) + rest,
-            st.sampled_from([0x40, 0xC0, 0x4C, 0x4D, 0x50, 0x1C]),
+            st.sampled_from([0x40, 0xC0, 0x4D, 0x50, 0x1C]),
             st.binary(max_size=8),
         ),
     ),
@@ -213,7 +208,7 @@ frames = st.builds(
 @settings(max_examples=100, deadline=None)
 @example([CanFrame(0x4E3, bytes([0x40]) * 8, t_ns=-5)])
 def test_any_frames_are_survived_and_the_next_sample_is_whole(given_frames):
-    decoder = SkinDecoder(PERIOD_S, old_ids=True)
+    decoder = SkinDecoder(PERIOD_S)
     for one in given_frames:
         decoder.feed(one)
         found = read_command(one)
