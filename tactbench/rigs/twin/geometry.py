@@ -90,6 +90,11 @@ def radius_mm(indenter: Indenter) -> float:
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
+def surface_of(sheet: SkinSheet) -> tuple[float, Dome | None, SheetTable | None]:
+    """Return outer radius [mm], dome and relief of a sheet: the finger's surface as :func:`gap_mm` takes it."""
+    return outer_radius_mm(sheet), sheet.dome, sheet.relief
+
+
 def gap_mm(
     grid: SkinGrid,
     contact: Contact,
@@ -150,17 +155,6 @@ def around_mm(
         across,
         np.cos(phi0) * below - np.sin(phi0) * along,
     )
-
-
-def finger_surface_mm(
-    grid: SkinGrid, outer_radius_mm: float, dome: Dome | None = None, relief: SheetTable | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the (nx, ns) places of the cells on the unloaded finger: axial, across, and height (the pad is below)."""
-    theta = grid.s_mm[None, :] / outer_radius_mm
-    phi, axial = _meridian(grid.x_mm[:, None], outer_radius_mm, dome)
-    inside = 0.0 if relief is None else relief.at(grid.x_mm, grid.s_mm / outer_radius_mm)
-    ring = (outer_radius_mm - inside) * np.cos(phi)
-    return axial - inside * np.sin(phi) + np.zeros_like(theta), ring * np.sin(theta), -ring * np.cos(theta)
 
 
 def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:

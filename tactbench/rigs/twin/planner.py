@@ -21,6 +21,7 @@ from tactbench.plugin import (
     load_object,
 )
 from tactbench.plugin.simulation import EffectDescriptor, Reason
+from tactbench.rigs.twin.effects.called_for import NOT_OBSERVED
 from tactbench.rigs.twin.synthesis import Settled
 
 STORED = "stored"
@@ -29,7 +30,6 @@ REFERENCE = "reference-force"
 """Token of the other thing it always needs: the reference force."""
 LENT = "core"
 """Token of effects that the contact solver calls upon by itself, if a load needs them."""
-UNNEEDED = "no observed channel depends on it"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = reasons.get(effect.name, Reason(False, UNNEEDED, 0.0))
+        reason = reasons.get(effect.name, Reason(False, NOT_OBSERVED, 0.0))
         taken = asked.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
@@ -164,7 +164,7 @@ def _needed(
     needed = _closure(taking, begin)
     for effect in taking:
         if not needed.intersection(effect.produces):
-            reasons[effect.name] = Reason(False, UNNEEDED, 0.0)
+            reasons[effect.name] = Reason(False, NOT_OBSERVED, 0.0)
     return reasons
 
 

@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
-from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    FloatArray,
+    NotApplicable,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    load_object,
+)
+from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances, Skin
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
@@ -174,6 +183,19 @@ class Synthesis:
         self.reference_n = load.at(self.t_s)
         for track in self.tracks:
             track.force_n = load.at(track.t_s)
+
+    @property
+    def skin(self) -> Skin:
+        """The sensor's skin.
+
+        Raises
+        ------
+        NotApplicable
+            If the sensor declares none.
+        """
+        if self.sensor.spec.skin is None:
+            raise NotApplicable(f"{self.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
+        return self.sensor.spec.skin
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
         """Return the nuisances of a kind of channel; None when the spec states none."""

@@ -43,14 +43,13 @@ def verdicts() -> Iterator[Verdict]:
     yield _stick_slip()
 
 
-def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float, float]:
-    """Return what the effects left out of `scene` change, what they may, and what noise hides: counts.
+def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
+    """Return what the effects left out of `scene` change, and at most may change by the plan: counts.
 
     Returns
     -------
     largest difference of any observed reading, before it is rounded, between a run with every effect and one with the
-    plan's; the sum of the bounds that the plan states; the least standard deviation of noise and rounding of an
-    observed kind, infinite without any stated noise.
+    plan's; the sum of the bounds that the plan states.
     """
     every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
     simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})
@@ -58,9 +57,7 @@ def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, 
     whole, _ = _unrounded(twin, sensor, scene.model_copy(update={"simulation": simulation}))
     largest = max(float(np.abs(a - b).max()) for a, b in zip(planned, whole, strict=True))
     bounds = [math.inf if entry.change is None else entry.change for entry in entries if not entry.included]
-    stated = [sensor.spec.nuisances[kind] for kind in scene.observe if kind in sensor.spec.nuisances]
-    floors = [nuisances.hidden(scene.environment.noise_scale) for nuisances in stated]
-    return largest, sum(bounds), min((floor for floor in floors if floor > 0), default=math.inf)
+    return largest, sum(bounds)
 
 
 def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list[FloatArray], tuple[PlanEntry, ...]]:
@@ -83,7 +80,7 @@ def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdic
 
 
 def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
-    largest, bound, _ = omitted(twin, sensor, scene)
+    largest, bound = omitted(twin, sensor, scene)
     # Rounding in the last digits of readings of thousands of counts.
     source = "0: the plan leaves out what changes nothing; bound: the sum of those that it states"
     return Verdict(f"{sensor.name}, {scene.name}: change by all effects that are left out", largest, 0.0, bound + 1e-9,

@@ -60,7 +60,7 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
         own, finer = said(low), said(high)
         if own is None or finer is None:
             continue
-        error = _apart(own, finer)
+        error = float(np.max(np.abs(own - finer)))
         if error <= (1 - TABLE_SHARE) * tolerance:
             return low, error
     last = list(RUNGS)[-1]
@@ -82,16 +82,12 @@ def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> Fl
     except RigError:
         return None
     states = [press(share * largest_n) for share in _PROBES]
-    slide, skin = slide_of(run), run.sensor.spec.skin
-    if names and skin is not None and slide is not None:
+    slide = slide_of(run)
+    if names and slide is not None:
         from tactbench.rigs.twin.contact.slide_table import dragged_state
         from tactbench.rigs.twin.contact.tangential import tangential_of
 
-        along, (direction, friction) = tangential_of(skin, press.medium.grid), slide
+        along, (direction, friction) = tangential_of(run.skin, press.medium.grid), slide
         states += [dragged_state(state, state, along, direction, friction, 0.0) for state in states]
     rest = read(press(0.0))
     return np.stack([read(state) - rest for state in states])
-
-
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    return float(np.max(np.abs(one - other)))

@@ -19,7 +19,7 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import AnyPress, scalars
+from tactbench.rigs.twin.contact.press import AnyPress, scalars, whole_skin
 
 _SCOUTS = 4
 _SCOUTS_POWER = 1.7
@@ -127,7 +127,7 @@ class _Builder:
 
     def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
         loads = sorted(self.nodes)
-        return through(loads, [_scalars(self.nodes[load][0]) for load in loads], touch_down)
+        return through(loads, [whole_skin(self.nodes[load][0]) for load in loads], touch_down)
 
 
 def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
@@ -136,10 +136,6 @@ def through(loads: list[float], values: list[FloatArray], touch_down: tuple[floa
         return Interpolant(np.array(loads), np.stack(values))
     breaks = [loads.index(load) for load in touch_down]
     return Interpolant(np.array(loads), np.stack(values), breaks, _ABOVE_POWER)
-
-
-def _scalars(state: SkinState) -> FloatArray:
-    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def build_table(

@@ -56,6 +56,11 @@ def scalars(state: SkinState) -> SkinState:
     return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
 
 
+def whole_skin(state: SkinState) -> FloatArray:
+    """Return depth, contact radius and fluid pressure: (3,) what a state says without any channel."""
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
+
+
 def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray) -> float:
     """Return ``sqrt(5/2 <r²>)`` weighted with the pressure: exact for Hertz, where counting cells is not."""
     r2 = (grid.x_mm[:, None] - contact.x_mm) ** 2 + (grid.s_mm[None, :] - contact.s_mm) ** 2

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable, Scalar
+from tactbench.plugin import FloatArray, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid, surface_of
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
 if TYPE_CHECKING:
@@ -42,10 +41,8 @@ _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
 
 def press_skin(run: Synthesis) -> None:
     """Refuse a contact that cannot be resolved; it is solved when a reading is first needed."""
-    skin = run.sensor.spec.skin
-    if skin is None:
-        raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
-    check_contact(skin_grid(skin.sheet, run.fidelity.cells(skin.sheet)), run.contact)
+    sheet = run.skin.sheet
+    check_contact(skin_grid(sheet, run.fidelity.cells(sheet)), run.contact)
 
 
 def forget_tables() -> None:
@@ -170,25 +167,23 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
-    slide, skin = slide_of(run), run.sensor.spec.skin
+    slide = slide_of(run)
     began = run.clock()
     sliding = None
-    if names and skin is not None and slide is not None:
+    if names and slide is not None:
         from tactbench.rigs.twin.contact.slide_table import build_slide_table
 
-        sliding = build_slide_table(press, read, table, skin, *slide)
+        sliding = build_slide_table(press, read, table, run.skin, *slide)
     slide_s = run.clock() - began
     medium = press.medium
     closing = press.closing_at(largest) if medium.has_core else 0.0
     film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
-    sheet = None if skin is None else skin.sheet
-    outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)
-    dome, relief = (None, None) if sheet is None else (sheet.dome, sheet.relief)
+    sheet = run.skin.sheet
+    outer_mm, dome, relief = surface_of(sheet)
     if within_reach:
         check_reach(press, largest, outer_mm, dome, relief)
-    pad = None if sheet is None else pad_of(sheet, medium.grid)
-    said = remarks(press, table.loads_n.tolist(), outer_mm, pad, dome, relief)
-    tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, said)
+    remarked = remarks(press, table.loads_n.tolist(), outer_mm, pad_of(sheet, medium.grid), dome, relief)
+    tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, remarked)
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
 
 

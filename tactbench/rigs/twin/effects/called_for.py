@@ -42,13 +42,6 @@ def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason
     return Reason(True, f"{text.format(size)}, scaled by {scale:g}", scale * size.value, size.unit)
 
 
-def _unpressed(scene: Scene, sensor: SensorSpec, no_skin: str = "declares no skin") -> str | None:
-    """Return why nothing presses a skin; None if it may."""
-    if sensor.skin is None:
-        return f"{sensor.name} {no_skin}"
-    return None if scene.profile.largest_n > 0 else NO_LOAD
-
-
 # The press and what reads it.
 
 
@@ -57,9 +50,8 @@ def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
     drive = scene.drive
     if drive is None:
         return _no("the scene declares no drive: the force follows its profile, 0 N off", "N")
-    idle = _unpressed(scene, sensor, "declares no skin to press on")
-    if idle is not None:
-        return _no(idle, "N")
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD, "N")
     filtered = "unfiltered" if drive.cutoff is None else f"behind a low-pass at {drive.cutoff}"
     steps = "a step per sample" if drive.rate is None else f"steps at {drive.rate}"
     return Reason(True, f"a motor presses by the measured force, {filtered}, {drive.delay} late, {steps}", None, "N")
@@ -67,9 +59,8 @@ def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the skin is pressed."""
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     return Reason(True, f"{scene.indenter} pressed with up to {scene.profile.largest_n:g} N")
 
 
@@ -92,9 +83,8 @@ def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def shear(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether an observed channel looks at what the skin does along itself."""
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
         return _no("no observed channel looks along the skin")
@@ -123,9 +113,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the sensor has a skin to read."""
-    if sensor.skin is None:
-        return _no(f"{sensor.name} declares no skin")
+    """Answer that channels of this kind read the skin."""
     return Reason(True, f"{sensor.principle} channels read the skin")
 
 
@@ -238,9 +226,8 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
     slide = scene.slide
     if slide is None:
         return _no("no tangential motion: the scene does not slide")
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     late = slide.start.to("s") - scene.profile.duration.to("s")
     if late >= 0:
         return _no(f"the slide would start {late:g} s after the recording's end")

@@ -29,7 +29,7 @@ def apply(run: Synthesis) -> None:
     numbers that are recorded: it is one sensor.
     """
     drive = run.scene.drive
-    if drive is None or not run.load.largest_n > 0 or run.sensor.spec.skin is None:
+    if drive is None or not run.load.largest_n > 0:
         return
     duration = run.scene.profile.duration.to("s")
     per_sample = drive.rate is None

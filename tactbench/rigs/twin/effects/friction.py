@@ -37,8 +37,8 @@ def apply(run: Synthesis) -> None:
     surface has slipped over the skin under it, in metres), ``slipping`` (1 while the whole contact slips) and
     ``stick_ratio``.
     """
-    slide, skin = run.scene.slide, run.sensor.spec.skin
-    if slide is None or skin is None or not run.load.largest_n > 0:
+    slide = run.scene.slide
+    if slide is None or not run.load.largest_n > 0:
         return
     surface, mode = slide.surface, mode_of(run.sensor.spec)
     duration = run.scene.profile.duration.to("s")
@@ -56,7 +56,7 @@ def apply(run: Synthesis) -> None:
         mode=mode,
         t_s=grid,
         load_n=load,
-        stiffness=sliding_stiffness(radius, shear_modulus_mpa(skin)),
+        stiffness=sliding_stiffness(radius, shear_modulus_mpa(run.skin)),
     )
     dragged = Dragged(drive)
     run.sliding = dragged
