@@ -8,7 +8,7 @@ from typing import Any
 
 from tactbench.core.plugins.interfaces import Operator, RecordingRequest
 from tactbench.core.plugins.registry import Family, Registry
-from tactbench.core.plugins.rigs import rig_of, taking_part
+from tactbench.core.plugins.rigs import rig_of
 
 GRACE_S = 5.0
 """Seconds that a real rig has to stand still and close its devices when its time is up."""
@@ -38,14 +38,6 @@ class Recorder:
             self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
         # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
         acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
-
-
-def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
-    """Return the names of effects and of an indenter of other packages that making a recording may import."""
-    effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
-    shape = str(request.scene.indenter.shape)
-    foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
-    return (*(one.descriptor.name for one in effects if not one.ours), *foreign)
 
 
 def is_computed(request: RecordingRequest) -> bool:

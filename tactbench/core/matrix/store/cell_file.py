@@ -34,12 +34,6 @@ class CellFile:
     """By role; none of a cell that did not finish."""
 
     @property
-    def text(self) -> str:
-        """All but the answers, as JSON."""
-        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
-        return json.dumps(head, allow_nan=False)
-
-    @property
     def digests(self) -> dict[str, str]:
         """Of the answers, by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
@@ -48,10 +42,11 @@ class CellFile:
         """Return the bytes of the file."""
         import numpy as np
 
-        text = self.text.encode()
+        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
+        text = json.dumps(head, allow_nan=False)
 
         def fill(file: Any) -> None:
-            file["head"] = np.bytes_(text)
+            file["head"] = np.bytes_(text.encode())
             for role, answers in self.answers.items():
                 file.create_dataset(f"answers/{role}", data=_table(answers), shuffle=True, compression=4)
 
@@ -79,10 +74,6 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
         raise FormatError(f"{path} {what}.", hint="Run the cell again.")
     with h5py.File(io.BytesIO(content), "r") as file:
         head = json.loads(file["head"][()])
-        row = head["row"]
-        if number := row.pop("repeat", None):  # until replicates were named by their seeds
-            name = f"{row['cell'].removesuffix(str(number))}{row['seed']}"
-            row |= {"cell": name, "key": row["key"] or path.stem}
         tables = {role: table[()] for role, table in file.get("answers", {}).items()} if answers else {}
     columns = {role: {name: table[name].copy() for name in _COLUMNS} for role, table in tables.items()}
     return CellFile(**head, answers={role: Answers(**values) for role, values in columns.items()})
