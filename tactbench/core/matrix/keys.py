@@ -1,7 +1,7 @@
-"""Keys: what decides a recording or a result, and nothing else, in one digest.
+"""Keys of recordings and results: digests of everything that determines them.
 
-What decides is listed in sections: the configuration, the versions, the source of each package (which holds its
-descriptors), the data. A key is the digest of its sections; ``tactbench why`` compares the sections of two keys.
+A key is the digest of its sections: configuration, versions, source of each package (with its descriptors) and data.
+``tactbench why`` compares the sections of two keys.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Keys:
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
     ) -> tuple[str, Sections]:
-        """Return the key of a cell that a caller in Python gives objects for, as to `solve`, and its sections.
+        """Return the key, and its sections, of a cell for which a caller in Python gives objects, as to `solve`.
 
         Raises ValueError as :func:`identity_of` does.
         """
@@ -75,12 +75,12 @@ class Keys:
         return digest_of(_canonical({**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}))
 
     def _making(self, sensor: str, rig: str, rig_file: RigFile | None, scene: Scene) -> Sections:
-        """Return what all recordings of one sensor by one rig share.
+        """Return the sections of a recording's key that do not depend on its scene's content, role and seed.
 
         Notes
         -----
-        What real devices gave stays true when the code that read them changes: of them it is sensor, rig and rig file
-        alone, so that nobody has to press everything again.
+        Recordings of real devices stay valid when the code of their drivers changes: their key covers sensor, rig and
+        rig file alone.
         """
         stated = "" if rig_file is None else rig_file.model_dump_json()
         sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
@@ -98,7 +98,7 @@ class Keys:
         return sections | {"versions": versions(), "source": sources_of(modules, RECORDING)}
 
     def _behind(self, devices: RigFile) -> list[str]:
-        """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""
+        """Return the modules of a rig file's devices, and of the simulation behind the emulated ones."""
         names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
         physics = self.registry.rigs.owned(devices.emulation.physics)
         return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
@@ -111,7 +111,7 @@ def _keyed(sections: Sections, data: Mapping[Path, str]) -> tuple[str, Sections]
 
 
 def configuration_of(cell: Cell) -> Sections:
-    """Return what a cell's key covers of its configuration."""
+    """Return the part of a cell's configuration that its key covers."""
     return {
         "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
         "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,
@@ -125,14 +125,14 @@ def differences(
     *,
     same: Callable[[Any, Any], bool] = lambda old, new: _canonical(old) == _canonical(new),
 ) -> list[str]:
-    """Return one sentence for everything in which two mappings differ.
+    """Return a sentence for each difference of two mappings.
 
     Parameters
     ----------
     within
-        What each sentence begins with.
+        Beginning of each sentence.
     same
-        Compares what is no mapping; by default as JSON.
+        Comparison of values that are not mappings; by default as JSON.
     """
     found = []
     for name in sorted({*before, *now}):

@@ -6,10 +6,10 @@ import statistics
 from collections.abc import Sequence
 
 from tactbench.plugin import IndenterDescriptor, Scene, SensorDescriptor
-from tactbench.plugin.simulation import EffectDescriptor, Explained
+from tactbench.plugin.simulation import Explained
 from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.fidelity import DEFAULT
-from tactbench.rigs.twin.planner import LENT, Plan
+from tactbench.rigs.twin.planner import Plan
 from tactbench.rigs.twin.preparation import carried_out
 
 _SEED = 1
@@ -17,7 +17,6 @@ _SEED = 1
 
 
 def explained(
-    effects: Sequence[EffectDescriptor],
     indenters: Sequence[IndenterDescriptor],
     sensor: SensorDescriptor,
     scene: Scene,
@@ -32,12 +31,11 @@ def explained(
         forget_tables()
         runs.append(carried_out(sensor, scene, _SEED, plan, DEFAULT, indenters))
     del runs[0]  # it paid for imports
-    lent = {effect.name for effect in effects if LENT in effect.produces}
     rows = []
     for entry in plan.settled(runs[-1].settled):
         if not entry.included:
             rows.append(Explained(entry, None))
-        elif entry.effect in lent:
+        elif entry.effect in plan.lent:
             rows.append(Explained(entry, None, "part of the contact"))
         else:
             rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))

@@ -23,7 +23,7 @@ _FEWEST_CELLS = 4
 
 @dataclass(frozen=True)
 class Contact:
-    """Where and with what the skin is pressed."""
+    """Place and shape of the contact of an indenter."""
 
     radius_mm: float
     """Radius of the cap; infinite for a flat surface and for another shape."""
@@ -36,7 +36,7 @@ class Contact:
     tilt_s: float = 0.0
     """Slope of the indenter across the finger [1]."""
     shape: Shape | None = None
-    """What is neither flat nor a cap."""
+    """Shape of an indenter that is neither flat nor a cap."""
 
 
 def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
@@ -52,7 +52,7 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     Raises
     ------
     RigError
-        If the sheet has no area, its radius is none, or it has fewer than four cells either way.
+        If the sheet has no area or no positive radius, or fewer than four cells either way.
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
@@ -166,15 +166,13 @@ def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[Float
 
 
 def check_contact(grid: SkinGrid, contact: Contact) -> None:
-    """Refuse a contact the grid cannot resolve or that misses the skin.
+    """Refuse a contact that the grid cannot resolve or that misses the skin.
 
     Raises
     ------
     RigError
-        If the cap's radius is below a cell, where a contact would live in one cell and follow the mesh and not the
-        physics; if another shape has risen by more than a cell at a cell from its axis (which says the same of a cap);
-        if it is tilted by more than 45 degrees; or if its apex is off the sheet, where the periodic sheet would answer
-        for the wrong side.
+        If the cap's radius is smaller than a cell, or another shape rises by more than a cell within a cell of its
+        axis; if it is tilted by more than 45 degrees; or if its apex is off the sheet.
     """
     dx, ds = grid.cell_mm
     if not contact.radius_mm >= max(dx, ds):

@@ -1,4 +1,4 @@
-"""The twin as a rig: opens a scene, applies its plan, hands out blocks."""
+"""The simulated rig: it applies the plan of a scene and yields the samples as blocks."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _ONE_CLOCK = Source(
 
 
 class Samples(NamedTuple):
-    """What one stream of a recording holds."""
+    """The samples of one stream of a recording."""
 
     t_ns: npt.NDArray[np.int64]
     """(n,) nanoseconds since the first sample."""
@@ -168,8 +168,7 @@ class Twin:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
         from tactbench.rigs.twin.costing import explained
 
-        plan, candidates = self.plan(sensor, scene), self._candidates(sensor, scene)
-        return explained(candidates, self.indenters, handled(sensor, scene), scene, plan, rounds)
+        return explained(self.indenters, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
 
 
 def build(context: RigContext) -> Twin:
@@ -217,7 +216,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "contact_s_mm": contact_s,
             **_sizes(run),
             **_stated(run.scene, run.sensor.spec),
-            **_asked(run.scene),
+            **_simulated_as(run.scene),
         },
         drawn=dict(run.drawn),
         samples=samples,
@@ -271,15 +270,15 @@ _STATED = frozenset({
     "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
     "surface_kinetic_friction", "surface_roughness_um",
 })  # fmt: skip
-"""Nuisances that a recording states where its scene does; others only where they were set for the run."""
+"""Nuisances that every recording states; others are stated only where they were set for the run."""
 
 
 def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
-    """Return the nuisances of the scene that decide most, those that were set, and the slide."""
-    asked = dict(scene.simulation.nuisances)
-    kept = _STATED | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
+    """Return the most important nuisances of the scene, those that were set for the run, and the slide."""
+    own = dict(scene.simulation.nuisances)
+    kept = _STATED | own.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
     stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in kept}
-    stated |= {name: amount.value for name, amount in sensor.settable().items() if name in asked}
+    stated |= {name: amount.value for name, amount in sensor.settable().items() if name in own}
     if scene.drive is not None and scene.drive.cutoff is None:
         stated["drive_cutoff_hz"] = "none"
     if scene.slide is not None:
@@ -287,18 +286,12 @@ def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
     return stated
 
 
-def _asked(scene: Scene) -> dict[str, Scalar]:
-    """Return what the scene asks of a simulation beyond the default: printed with every row."""
-    asked: dict[str, Scalar] = {}
-    if scene.simulation.effects:
-        asked["effects"] = " ".join(scene.simulation.effects)
-    if scene.simulation.rung is not None:
-        asked["rung"] = scene.simulation.rung
-    if scene.simulation.tolerance is not None:
-        asked["tolerance_count"] = scene.simulation.tolerance
-    if scene.simulation.scenario is not None:
-        asked["scenario"] = scene.simulation.scenario
-    return asked
+def _simulated_as(scene: Scene) -> dict[str, Scalar]:
+    """Return the scene's settings of the simulation that differ from the default: printed with every row."""
+    own = scene.simulation
+    found = {"effects": " ".join(own.effects) or None, "rung": own.rung, "tolerance_count": own.tolerance}
+    found["scenario"] = own.scenario
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:

@@ -33,7 +33,7 @@ _STEP_MM = 1e-4
 
 @dataclass(frozen=True)
 class Shape:
-    """A body that is neither flat nor a cap, as a scene wants it."""
+    """An indenter that is neither flat nor a cap, with its dimensions and orientation."""
 
     name: str
     sizes: tuple[tuple[str, float], ...]
@@ -48,7 +48,7 @@ class Shape:
         Raises
         ------
         PluginContractError
-            If its plugin returns another shape, or what is no finite number.
+            If its plugin returns an array of another shape, or numbers that are not finite.
         """
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         x, y = np.broadcast_arrays(cos * x_mm + sin * s_mm, cos * s_mm - sin * x_mm)
@@ -70,14 +70,14 @@ class Shape:
 
 
 def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Shape | None:
-    """Return the shape that a scene names; None for a cap and a flat surface, which its radius says.
+    """Return the shape that a scene names; None for a cap or a flat surface, which the radius describes.
 
     Raises
     ------
     RigError
         If no such shape is installed.
     UsageError
-        If a dimension is none of its own, in another unit, or out of its range.
+        If a dimension is unknown, in another unit, or out of its range.
     """
     if indenter.shape is None:
         return None

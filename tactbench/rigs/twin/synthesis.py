@@ -1,4 +1,4 @@
-"""The recording in the making: what the effects of a plan read and write, in the plan's order."""
+"""The state of a simulated recording, which the effects of its plan read and change in turn."""
 
 from __future__ import annotations
 
@@ -58,24 +58,24 @@ class Load:
 
 
 class Tangential(NamedTuple):
-    """What happens along the skin at (n,) moments, in the direction of the slide."""
+    """The tangential state of the contact at (n,) moments, in the direction of the slide."""
 
     force_n: FloatArray
     """Tangential force between surface and skin, as a force sensor behind the surface feels it."""
     displacement_mm: FloatArray
-    """Of the skin under the contact, against the core."""
+    """Displacement of the skin under the contact relative to the core."""
     slip_mm_s: FloatArray
     """Speed of the surface over the skin; 0 while they stick."""
     slip_mm: FloatArray
-    """Way that the surface has slipped over the skin."""
+    """Distance that the surface has slipped over the skin."""
     slipping: npt.NDArray[np.bool_]
-    """The whole contact slips."""
+    """Whether the whole contact slips."""
     stick_ratio: FloatArray
     """Radius of the part that sticks over that of the contact, 0 to 1."""
 
 
 class Settled(NamedTuple):
-    """What only the solve could decide about an effect."""
+    """The entry of an effect in the plan that is decided after the contact is solved."""
 
     included: bool
     reason: str
@@ -97,11 +97,11 @@ class Track:
     force_n: FloatArray
     """(n,) true normal force at this clock's samples."""
     readings: FloatArray
-    """(n, channels) what the channels would say; starts at rest."""
+    """(n, channels) readings; they start at rest."""
     quality: npt.NDArray[np.uint8]
     """(n, channels)"""
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
-    """(n,) force the response of a kind of channel follows, where it is not the true one."""
+    """(n,) force that the response of a kind of channel follows, where it differs from the true one."""
     vibration_mm: FloatArray | None = None
     """(n,) motion of the skin along its normal, beyond what the load explains; None: nothing shakes it."""
     gain: FloatArray | None = None
@@ -118,7 +118,7 @@ class Track:
 
     @property
     def scope(self) -> tuple[str, ...]:
-        """What tells this clock's random draws from those of another."""
+        """Scope of this clock's random draws, which differ from those of other clocks."""
         return (self.clock,) if self.clock else ()
 
 
@@ -140,21 +140,21 @@ class Synthesis:
     """The sensor's channels, clock by clock."""
     contact: Contact
     reference_n: FloatArray
-    """(n,) what the force sensor says; starts at the true force."""
+    """(n,) reading of the force sensor; starts at the true force."""
     fluid_pressure: bool = False
-    """The pressure of the fluid is observed."""
+    """Whether the pressure of the fluid is observed."""
     tangential: bool = False
-    """What the skin does along itself is observed."""
+    """Whether the tangential state of the skin is observed."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
-    """What happens along the skin at any (n,) seconds; None: nothing."""
+    """Function from (n,) seconds to the tangential state; None if nothing slides."""
     lent: dict[str, str] = field(default_factory=dict)
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, Settled] = field(default_factory=dict)
     """Plan entries that only the solve could decide, by name."""
-    asked: frozenset[str] = frozenset()
-    """Effects that the scene asks for by name: they are applied whatever the solve says."""
+    forced: frozenset[str] = frozenset()
+    """Effects that the scene includes by name: they are applied whatever the solution of the contact."""
     fidelity: Fidelity = DEFAULT
     """How finely the contact is resolved."""
     rung: str = ""
@@ -162,7 +162,7 @@ class Synthesis:
     rung_error: float | None = None
     """Its estimated error in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
-    """What was drawn or achieved."""
+    """Random draws and achieved accuracies that the recording keeps."""
     clock: Callable[[], float] = time.perf_counter
     """Seconds, monotonic."""
     spent_s: dict[str, float] = field(default_factory=dict)
@@ -178,7 +178,7 @@ class Synthesis:
         self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
 
     def follow(self, load: Load) -> None:
-        """Let the true force be `load`: on every clock, and as what the force sensor starts from."""
+        """Make `load` the true force, on every clock and for the force sensor."""
         self.load = load
         self.reference_n = load.at(self.t_s)
         for track in self.tracks:

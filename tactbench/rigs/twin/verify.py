@@ -1,4 +1,4 @@
-"""The simulation held against laws and closed forms: what ``tactbench twin verify`` prints, a line each.
+"""Comparison of the simulation with laws and closed forms, for ``tactbench twin verify``.
 
 The references of the solvers (boundary elements, finite elements, fine grids) are tests: ``pytest tests/oracles``.
 """
@@ -26,19 +26,18 @@ from tactbench.rigs.twin.rig import Twin, build
 
 RADIUS_MM = 10.0
 _TASK = "force"
-"""Its first scene is planned for every sensor that is looked at."""
+"""Task whose first scene is simulated for each sensor."""
 
 
 def verdicts() -> Iterator[Verdict]:
-    """Yield the verdicts, each computed when it is asked for."""
+    """Yield the verdicts; each is computed when the iteration reaches it."""
     yield from _contact()
     registry = load_registry()
     twin = build(rig_context(registry))
     for name in ("biotac", "icub"):
-        if name in registry.sensors:
-            scene = registry.tasks[_TASK].spec.scenes[0].scene
-            yield from _skin(twin, registry.sensors[name], scene)
-            yield _left_out(twin, registry.sensors[name], scene)
+        scene = registry.tasks[_TASK].spec.scenes[0].scene
+        yield from _skin(twin, registry.sensors[name], scene)
+        yield _left_out(twin, registry.sensors[name], scene)
     yield from _memory()
     yield _stick_slip()
 
@@ -68,7 +67,7 @@ def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list
 
 
 def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdict]:
-    """Yield the balances that a sensor's own skin keeps under 2 N."""
+    """Yield the force balance of a sensor's skin under 2 N and, over a fluid, the balance of volume."""
     press = press_of(prepare(sensor, scene, 1, twin.plan(sensor, scene)), DEFAULT)
     state = press(2.0)
     carried = float(state.pressure_mpa.sum() * np.prod(state.grid.cell_mm))

@@ -8,13 +8,14 @@ A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, UsageError
+from tactbench.plugin import Block, Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 
 BIT_RATE = 1_000_000
@@ -91,13 +92,13 @@ class Version:
 
 
 def polling_id(board: int, source: int = 0) -> int:
-    """Return the identifier of a command to `board` (15: to all) from `source`; raises UsageError outside 0 to 15."""
-    return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
+    """Return the identifier of a command to `board` (15: all boards) from `source`."""
+    return POLLING << 8 | source << 4 | board
 
 
 def skin_id(board: int, triangle: int) -> int:
-    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15."""
-    return SKIN << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
+    """Return the identifier of a triangle's two frames."""
+    return SKIN << 8 | board << 4 | triangle
 
 
 def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
@@ -109,28 +110,22 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
         Destination, 0 to 14, or :data:`BROADCAST`.
     source
         Sender, 0 for a host.
-
-    Raises
-    ------
-    UsageError
-        If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
     """
     match command:
         case BoardSetup(skin_type, period_ms, no_load):
             numbers = [0x4D, skin_type, period_ms, no_load]
         case TriangleSetup(first, last, shift, enabled, cdc):
-            _within("first triangle", first, _within("last triangle", last, 15))
-            numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
+            numbers = [0x50, first, last, shift, int(enabled), *cdc.to_bytes(2, "little")]
         case Transmit(on):
             numbers = [0x07, 0 if on else 1]
         case VersionRequest(major, minor):
             numbers = [0x1C, major, minor]
-    return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
+    return CanFrame(polling_id(board, source), bytes(numbers))
 
 
 def read_command(frame: CanFrame) -> tuple[int, Command] | None:
     """Return (destination board, command), or None if `frame` is none of these commands or too short for it."""
-    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
+    if frame.extended or frame.id >> 8 != POLLING or not frame.data:
         return None
     board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
     found: Command
@@ -148,14 +143,14 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
-    """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
+    """Return the answer of `board` to the :class:`VersionRequest` of `to`."""
     numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
-    return CanFrame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
+    return CanFrame(polling_id(to, board), bytes(numbers))
 
 
 def read_version(frame: CanFrame) -> tuple[int, Version] | None:
     """Return (board that answers, its version), or None if `frame` is no such answer."""
-    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or len(frame.data) != 8:
+    if frame.extended or frame.id >> 8 != POLLING or len(frame.data) != 8:
         return None
     code, kind, major, minor, build, protocol_major, protocol_minor, fits = frame.data
     if code & 0x7F != 0x1C:
@@ -174,17 +169,10 @@ def skin_frames(
         (12,) readings, 0 to 255.
     word
         Error word: bit 4 + i is taxel i out of range, then :data:`NO_ACK` and :data:`NOT_CONNECTED`.
-
-    Raises
-    ------
-    UsageError
-        If there are not 12 readings or a number does not fit its field.
     """
-    if len(taxels) != TAXELS:
-        raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
-    values = bytes(_within("a reading", value, 255) for value in taxels)
+    values = bytes(taxels)
     identifier = skin_id(board, triangle)
-    errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
+    errors = word.to_bytes(2, "big")
     return (
         CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
         CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
@@ -236,45 +224,9 @@ class Sample:
 
 
 @dataclass
-class Counts:
-    """What was found in the frames of one triangle."""
-
-    samples: int = 0
-    missing_heads: int = 0
-    missing_tails: int = 0
-    far_apart: int = 0
-    """Samples whose halves are half a period apart or more."""
-    doubled: int = 0
-    """Frames kept out because they came twice."""
-    malformed: int = 0
-    """Frames kept out for their length."""
-    not_connected: int = 0
-    no_ack: int = 0
-    out_of_range: list[int] = field(default_factory=lambda: [0] * TAXELS)
-    """(12,) samples in which the error word called the taxel out of range."""
-    long_intervals: int = 0
-    """Samples more than 1.5 periods after the one before: both frames lost, or a late host; only a fit of the clocks
-    can tell."""
-
-    def named(self) -> dict[str, int]:
-        """Return what was wrong, by the names that a recording has, without what never was."""
-        found = {
-            "heads missing": self.missing_heads,
-            "tails missing": self.missing_tails,
-            "halves far apart": self.far_apart,
-            "frames doubled": self.doubled,
-            "frames of wrong length": self.malformed,
-            "samples not connected": self.not_connected,
-            "samples not acknowledged": self.no_ack,
-            "long intervals": self.long_intervals,
-        }
-        found |= {f"T{number} out of range": samples for number, samples in enumerate(self.out_of_range, 1)}
-        return {name: number for name, number in found.items() if number}
-
-
-@dataclass
 class _Triangle:
-    counts: Counts = field(default_factory=Counts)
+    counts: Counter[str] = field(default_factory=Counter)
+    samples: int = 0
     head: CanFrame | None = None
     """Waits for its tail."""
     tail: CanFrame | None = None
@@ -307,7 +259,8 @@ class SkinDecoder:
     Attributes
     ----------
     counts
-        (board, triangle) -> :class:`Counts`.
+        (board, triangle) -> counts of what was wrong, by the names that a recording has. "Long intervals" are samples
+        more than 1.5 periods after the one before: both frames were lost, or the host was late.
     foreign
         Frames that were no skin data.
 
@@ -325,9 +278,9 @@ class SkinDecoder:
         self._triangles: dict[tuple[int, int], _Triangle] = {}
 
     @property
-    def counts(self) -> dict[tuple[int, int], Counts]:
+    def counts(self) -> dict[tuple[int, int], Counter[str]]:
         """(board, triangle) -> what was found so far."""
-        return {key: triangle.counts for key, triangle in self._triangles.items()}
+        return {key: +triangle.counts for key, triangle in self._triangles.items()}
 
     def feed(self, frame: CanFrame) -> list[Sample]:
         """Return the samples, at most two, that `frame` completes or proves incomplete."""
@@ -338,12 +291,12 @@ class SkinDecoder:
         key = (frame.id >> 4 & 0xF, frame.id & 0xF)
         triangle = self._triangles.setdefault(key, _Triangle())
         if len(data) != 8:
-            triangle.counts.malformed += 1
+            triangle.counts["frames of wrong length"] += 1
             return []
         head = triangle.head
         if data[0] == HEAD:
             if head is not None and self._near(head, frame) and head.data == data:
-                triangle.counts.doubled += 1
+                triangle.counts["frames doubled"] += 1
                 triangle.doubled += tuple(range(IN_HEAD))
                 return []
             triangle.head = frame
@@ -351,7 +304,7 @@ class SkinDecoder:
         last, triangle.head, triangle.tail = triangle.tail, None, frame
         if head is None:
             if last is not None and self._near(last, frame) and last.data == data:
-                triangle.counts.doubled += 1
+                triangle.counts["frames doubled"] += 1
                 triangle.doubled += tuple(range(IN_HEAD, TAXELS))
                 return []
             return [self._sample(key, triangle, None, frame)]
@@ -379,7 +332,7 @@ class SkinDecoder:
         first = head or tail
         assert first is not None
         if triangle.last_ns is not None and first.t_ns - triangle.last_ns > 1.5 * self._period_ns:
-            counts.long_intervals += 1
+            counts["long intervals"] += 1
         triangle.last_ns = first.t_ns
         taxels = (head.data[1:] if head else bytes(IN_HEAD)) + (tail.data[1:6] if tail else bytes(TAXELS - IN_HEAD))
         word = int.from_bytes(tail.data[6:]) if tail else None
@@ -388,9 +341,9 @@ class SkinDecoder:
             marks[taxel] |= Quality.SUSPECT
         for taxel in out_of_range(word or 0):
             marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
-            counts.out_of_range[taxel] += 1
+            counts[f"T{taxel + 1} out of range"] += 1
         far_apart = head is not None and tail is not None and not self._near(head, tail)
-        counts.far_apart += far_apart
+        counts["halves far apart"] += far_apart
         if far_apart or tail is None or (word or 0) & (NO_ACK | RESERVED):
             marks = [mark | Quality.SUSPECT for mark in marks]
         if head is None:
@@ -399,43 +352,24 @@ class SkinDecoder:
             marks[IN_HEAD:] = [Quality.MISSING] * (TAXELS - IN_HEAD)
         if (word or 0) & NOT_CONNECTED:
             marks = [Quality.MISSING] * TAXELS
-        counts.missing_heads += head is None
-        counts.missing_tails += tail is None
-        counts.no_ack += bool((word or 0) & NO_ACK)
-        counts.not_connected += bool((word or 0) & NOT_CONNECTED)
-        counts.samples += 1
+        counts["heads missing"] += head is None
+        counts["tails missing"] += tail is None
+        counts["samples not acknowledged"] += bool((word or 0) & NO_ACK)
+        counts["samples not connected"] += bool((word or 0) & NOT_CONNECTED)
+        triangle.samples += 1
         triangle.doubled = ()
-        return Sample(*key, counts.samples - 1, first.t_ns, taxels, tuple(marks), word)
+        return Sample(*key, triangle.samples - 1, first.t_ns, taxels, tuple(marks), word)
 
 
-def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:
+def to_block(samples: Sequence[Sample]) -> Block:
     """Return samples of one triangle as a block of the sensor's stream.
 
     Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well]. The block has no
     sequence, which stands for a device's own counter.
-
-    Raises
-    ------
-    RigError
-        If the samples are of several triangles.
     """
-    if len({(sample.board, sample.triangle) for sample in samples}) > 1:
-        raise RigError("The samples are of several triangles.", hint="Make one block for each (board, triangle).")
     return Block(
-        stream=stream,
+        stream="taxels",
         t_ns=np.array([sample.t_ns for sample in samples], dtype=np.int64),
         data=np.array([list(sample.taxels) for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
         quality=np.array([sample.quality for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
     )
-
-
-def _within(what: str, number: int, most: int) -> int:
-    if not 0 <= number <= most:
-        raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
-    return number
-
-
-def _low_high(number: int) -> tuple[int, int]:
-    """Little-endian bytes of a 16-bit number."""
-    _within("a 16-bit number", number, 0xFFFF)
-    return number & 0xFF, number >> 8

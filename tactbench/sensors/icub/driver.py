@@ -82,7 +82,7 @@ class FingertipDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """See :meth:`~tactbench.sensors.icub.codec.Counts.named`; beside them what was not ours, or no data frame."""
+        """Counts of :class:`~tactbench.sensors.icub.codec.SkinDecoder`, of frames of others, and of the link."""
         return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
 
     def identify(self) -> Mapping[str, str]:
@@ -179,7 +179,7 @@ class FingertipDriver(Driver):
         """Return what the decoder has counted; it is given frames of one triangle only."""
         found = Counter({"frames that are no skin data": self._decoder.foreign})
         for counts in self._decoder.counts.values():
-            found.update(counts.named())
+            found.update(counts)
         return found
 
     def _send(self, command: Command) -> None:

@@ -1,4 +1,4 @@
-"""Readings against load, solved at a few loads only.
+"""Tables of readings against load, solved at a few loads only.
 
 Quasi-static contact depends on time through the force alone. So the skin is solved at a few loads, all wanted readings
 are kept, and a shape-preserving cubic between the nodes answers for every sample. What an interpolant through all
@@ -61,7 +61,7 @@ class LoadTable:
     states: tuple[SkinState, ...]
     """(n,) the skin at the nodes, without its fields."""
     touch_down_n: tuple[float, float] | None
-    """Bracket of the load at which the core is touched; None when it never is."""
+    """Bracket of the load at which the skin touches the core; None if it never does."""
     error: FloatArray
     """(channels,) three times the most by which a solved reading differs from the interpolant through the others."""
     interpolant: Interpolant
@@ -98,7 +98,7 @@ class LoadTable:
         return np.column_stack([np.interp(force_n, middles, chord) for chord in chords])
 
     def skin(self, force_n: FloatArray) -> SkinCurves:
-        """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
+        """Return depth, contact radius and fluid pressure at (m,) forces, held at the ends of the table."""
         depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T
         return SkinCurves(depth_mm=depth, contact_radius_mm=radius, fluid_pressure_mpa=pressure)
 
@@ -118,7 +118,7 @@ class _Builder:
             began = self._clock()
             self.nodes[force] = (scalars(state), self._read(state))
             self.read_s += self._clock() - began
-            self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
+            self.closed[force] = force > 0 and self._press.closing_at(force) > 0
         return self.nodes[force][1]
 
     def interpolant(self, touch_down: tuple[float, float] | None, without: float | None = None) -> Interpolant:
@@ -131,7 +131,7 @@ class _Builder:
 
 
 def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
-    """Return what runs through (channels,) `values` at `loads`, with breaks where the core is touched."""
+    """Return the interpolant of (channels,) `values` at `loads`, with breaks where the skin touches the core."""
     if touch_down is None:
         return Interpolant(np.array(loads), np.stack(values))
     breaks = [loads.index(load) for load in touch_down]

@@ -1,7 +1,7 @@
-"""The cheapest rung: every cell answers for itself, as if the skin were a bed of springs (Winkler).
+"""The closed-form rung: the skin as a bed of independent springs (Winkler).
 
-Right for foams and thin compressible layers, where a neighbour hardly feels a neighbour; hopeless for rubber, whose
-volume has to go somewhere. So it refuses what it is known to be wrong for, instead of being quick and wrong.
+The model holds for foams and thin compressible layers, whose cells hardly influence each other. It refuses skins of
+nearly constant volume.
 """
 
 from __future__ import annotations
@@ -26,14 +26,12 @@ class LocalPress:
 
     Parameters
     ----------
-    skin
-        As declared.
-    medium
-        The same on its grid.
+    skin, medium
+        The skin as declared, and on its grid.
     gap_mm
         (nx, ns) gap at zero approach.
     contact
-        Where the apex is.
+        Place of the apex.
 
     Raises
     ------
@@ -106,10 +104,6 @@ class LocalPress:
         )
 
     def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
         """Return minus infinity: there is no core."""
         return -np.inf
 

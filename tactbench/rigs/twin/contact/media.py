@@ -1,4 +1,4 @@
-"""What every skin medium offers the solver, a stiffness per Fourier mode and a local law."""
+"""The interface of skin media to the solver: a stiffness per Fourier mode and a local law."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class Medium:
     rest_thickness_mm: FloatArray
     """(nx, ns) film or layer with nothing touching."""
     least_thickness_mm: float
-    """What stays open when pressed flat; 0 where there is no such limit."""
+    """Film that remains when the skin is pressed flat; 0 where there is no such limit."""
     low_modes: int
     """Pairs of soft modes that the preconditioner solves exactly: chosen for speed, without effect on the result."""
     contact_updates: int = 0
-    """Times that what the indenter penetrates is taken back; 0 where the contact's stiffness is the skin's own."""
+    """Number of corrections for the penetration by the penalty; 0 where the contact stiffness is a skin property."""
     has_core: bool = False
-    """There is a core to touch down on when less than `least_thickness_mm` would be left."""
+    """Whether a core carries load when less than `least_thickness_mm` would be left."""
 
     def closing_mm(self, deflection_mm: FloatArray) -> float:
         """Return how far the skin passes the least film; above zero the core is touched."""

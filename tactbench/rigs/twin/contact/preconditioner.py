@@ -1,4 +1,4 @@
-"""What makes the inner CG short: the soft modes solved exactly, the stiff ones by their diagonal.
+"""Preconditioner of the conjugate gradients: soft modes solved exactly, stiff ones by their diagonal.
 
 A skin is stiff against short waves, so the contact's varying stiffness matters for long waves only. These few modes,
 together with the approach, form a small dense matrix that is factorised once per Newton step.

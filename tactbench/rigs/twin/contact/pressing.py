@@ -1,4 +1,4 @@
-"""What presses one recording's skin at a given fidelity, and what reads it."""
+"""Solver and transducer of one recording's skin at a given fidelity."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _MAY_BE_ZERO = frozenset({
 
 
 def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPress, Read]:
-    """Return what solves the loads of `run` and what reads the channels in `names` from a solved skin.
+    """Return the solver of the loads of `run`, and the function that reads the channels `names` from a solved skin.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
 
 
 def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
-    """Return what reads the channels in `names` from a solved skin of `run`; raises as :func:`pressed`."""
+    """Return the function that reads the channels `names` from a solved skin of `run`; raises as :func:`pressed`."""
     if not names:
         return whole_skin
     skin = run.skin
@@ -68,7 +68,7 @@ def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
 
 
 def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
-    """Return what solves the loads of `run`; raises as :func:`pressed`."""
+    """Return the solver of the loads of `run`; raises as :func:`pressed`."""
     skin = run.skin
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     gap = gap_mm(grid, run.contact, *surface_of(skin.sheet))
@@ -97,7 +97,7 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
 def _reader(
     sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
 ) -> Callable[[SkinState], FloatArray]:
-    """Return the sensor's transducer, each of its answers looked at before it is used."""
+    """Return the sensor's transducer, with a check of each result."""
     try:
         factory: TransducerFactory = load_object(sensor.transducer or "")
         transducer: Transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))

@@ -1,4 +1,4 @@
-"""The effects of contact as stages of a synthesis: press, look at the fluid, read the skin."""
+"""The effects of contact: pressing the skin, and reading the channels from it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tactbench.rigs.twin.contact.slide_table import SlideTable
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
-"""Kinds of channels a sensor's transducer answers for."""
+"""Kinds of channels that a sensor's transducer computes."""
 _MOST_TABLES = 64
 
 
@@ -51,12 +51,12 @@ def forget_tables() -> None:
 
 
 def watch_fluid(run: Synthesis) -> None:
-    """Ask for the pressure of the fluid with every solved load."""
+    """Request the pressure of the fluid with every solved load."""
     run.fluid_pressure = True
 
 
 def watch_shear(run: Synthesis) -> None:
-    """Ask for what the skin does along itself with every solved load."""
+    """Request the tangential state of the skin with every solved load."""
     run.tangential = True
 
 
@@ -86,9 +86,9 @@ def read_skin(run: Synthesis) -> None:
 
 
 def skin_under_load(run: Synthesis) -> LoadTable:
-    """Return what the skin and the channels read from it do under any load of this recording; solved once.
+    """Return the load table of this recording's skin and channels; it is solved once.
 
-    Whether the fluid's pressure belongs to it must be settled before it is first asked for.
+    The table holds the fluid's pressure only if that was requested before the first call.
     """
     return _tables(run).table
 
@@ -105,7 +105,7 @@ def _tables(run: Synthesis) -> _Tabulated:
 def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
     """Return the radius of the contact under (n,) forces, for laws of a round contact.
 
-    Of a contact that is not round it is that of a circle whose load is as far from its middle; the recording says so.
+    Of other contacts it is that of a circle with the same mean square distance of the load, and a remark states so.
     """
     if run.contact.shape is not None:
         run.drawn["remark round"] = (
@@ -116,9 +116,9 @@ def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
 
 
 def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
-    """Return what the skin alone does up to a load, no channel read: for those who decide upon the load.
+    """Return the load table of the skin up to a load, without channels: for effects that determine the load.
 
-    It may end beyond the reach of a cap: whether the load that is decided upon does is looked at when the skin is read.
+    It may reach past the rim of a cap: the final load is checked when the channels are read.
     """
     return _tabulated(run, [], largest_n, only_skin=True).table
 
@@ -129,9 +129,9 @@ def read_names(run: Synthesis) -> list[str]:
 
 
 def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: bool = False) -> _Tabulated:
-    spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
+    spec, tolerance = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
-        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
+        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
         f"|{run.tangential}|{slide_of(run)}"
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
@@ -153,7 +153,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
 
 
 def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> tuple[_Tabulated, float]:
-    """Return the table, and the seconds that preparing to read the skin and reading it took."""
+    """Return the table, and the seconds spent on preparing the transducer and reading the skin."""
     fidelity = run.fidelity
     press = press_of(run, fidelity)
     began = run.clock()
@@ -188,8 +188,8 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
-"""Depth and contact radius [mm] and pressure [MPa] where no channel says how closely the skin must be known: a
-hundredth of what a ramp to a few newtons gives."""
+"""Tolerances of depth and contact radius [mm] and of pressure [MPa] where no channel determines one: a hundredth of
+their values under a few newtons."""
 
 
 def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
@@ -209,8 +209,8 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         bounds.append(hidden if hidden > 0 else 1e-4 * span)
     aim = run.fidelity.table_tolerance_factor * np.array(bounds)
-    asked = run.scene.simulation.tolerance
-    return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
+    tolerance = run.scene.simulation.tolerance
+    return aim if tolerance is None else np.minimum(aim, TABLE_SHARE * tolerance)
 
 
 def _report(run: Synthesis, tabulated: _Tabulated) -> None:

@@ -1,4 +1,4 @@
-"""How a skin's outer surface moves along itself: what a press squeezes out, and where a traction drags it.
+"""Tangential displacement of a skin's outer surface under pressure and under traction.
 
 The answer is linear in pressure and traction. That a traction also lifts the surface, and so changes the pressure, is
 neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an incompressible layer.
@@ -22,7 +22,7 @@ Direction = tuple[float, float]
 
 
 class TangentialResponse(Protocol):
-    """A skin's answer along its surface."""
+    """Tangential response of a skin."""
 
     def pressed(self, state: SkinState) -> FloatArray:
         """Return the (2, nx, ns) displacement [mm] of a pressed skin without friction."""
@@ -35,16 +35,16 @@ class TangentialResponse(Protocol):
 
 
 def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
-    """Return what moves the surface of `skin` along itself."""
+    """Return the tangential response of `skin`."""
     if isinstance(skin, BondedLayer):
         return _Layer(skin, grid)
     return _Shell(skin, grid) if isinstance(skin, FluidBackedShell) else _Patch(skin)
 
 
 def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
-    """Return `state` with what a press without friction does along the surface, and no traction.
+    """Return `state` with the tangential displacement of a frictionless press, and no traction.
 
-    None: no channel looks, or the scene leaves it out; nothing moves.
+    Without a tangential response (`along` is None) the displacement is zero.
     """
     moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
     return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))

@@ -1,7 +1,4 @@
-"""Where a solved contact leaves the ground the model stands on: refused where it is not one, remarked on otherwise.
-
-Everything here is looked at once, at a scene's largest load, and kept with the recording.
-"""
+"""Limits of the contact model: checks that refuse a solved contact, and remarks that its recording keeps."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ HELD_AGAINST_N = 5.0
 INTO_THE_CORE = 0.1
 """Share of the film by which the skin may pass into the core: its penalty is softer than a core. Assumed."""
 AT_THE_EDGE = 0.01
-"""Share of the load outside the active skin that is still no remark. Assumed."""
+"""Share of the load outside the active skin above which there is a remark. Assumed."""
 
 
 def check_reach(
@@ -37,7 +34,7 @@ def check_reach(
     dome: Dome | None = None,
     relief: SheetTable | None = None,
 ) -> None:
-    """Refuse a load under which the skin is touched where the cap no longer exists; the skin's surface as in `gap_mm`.
+    """Refuse a load under which the skin touches beyond the rim of the cap; the surface is given as to `gap_mm`.
 
     Raises
     ------
@@ -63,7 +60,7 @@ def remarks(
     dome: Dome | None = None,
     relief: SheetTable | None = None,
 ) -> dict[str, Scalar]:
-    """Return what a reader of this contact must know, at the largest of `loads_n`.
+    """Return remarks on the validity of a contact at the largest of `loads_n`.
 
     Parameters
     ----------

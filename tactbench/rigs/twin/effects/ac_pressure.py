@@ -12,7 +12,7 @@ from tactbench.rigs.twin.synthesis import Synthesis
 
 
 def apply(run: Synthesis) -> None:
-    """Add to every channel of dynamic pressure what its band lets through.
+    """Add the band-passed pressure of the fluid to every channel of dynamic pressure.
 
     The fluid's pressure follows the load; a vibration of the skin adds its size times the pressure's slope with depth
     at that load, so that its loudness needs no parameter of its own.
@@ -31,7 +31,7 @@ def apply(run: Synthesis) -> None:
 
 
 def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
-    """Return what a band lets through of (n,) pressures that are straight between samples.
+    """Return (n,) pressures, linear between samples, filtered by the band of a channel.
 
     A first-order high-pass and a first-order low-pass with their corners at the band's ends: the makers state the
     ends, no source the order. Both are exact for any step.
@@ -47,7 +47,7 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
 
 
 def stiffness_mpa_mm(table: LoadTable, force_n: FloatArray) -> FloatArray:
-    """Return (n,) how the fluid's pressure grows with depth at (n,) loads."""
+    """Return the (n,) slopes of the fluid's pressure against depth at (n,) loads."""
     slope: FloatArray = table.per_mm(lambda loads_n: table.skin(loads_n).fluid_pressure_mpa[:, None], force_n)[:, 0]
     return slope
 

@@ -1,4 +1,4 @@
-"""Creep: part of the response follows the load late."""
+"""Creep: part of a channel's response follows the load with a delay."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
 def apply(run: Synthesis) -> None:
     """Replace the force that each kind of channel follows by ``F (1 - sum c_i) + sum c_i lag_i(F)``.
 
-    Linear viscoelasticity acts on the force before the load table is asked: loops follow from the force's history.
-    It is left out, and the plan says so, where it changes no reading by more than a third of noise and rounding
+    Linear viscoelasticity acts on the force before the load table is evaluated: hysteresis follows from its history.
+    It is left out, and the plan is updated, where it changes no reading by more than a third of noise and rounding
     (:func:`bounds`), unless the scene asks for it by name or has a motor's force loop.
     """
     late = {kind: stated for track in run.tracks for kind in track.by_kind() if (stated := _creeping(run, kind))}
-    if late and run.scene.drive is None and "creep" not in run.asked and _settled(run, late):
+    if late and run.scene.drive is None and "creep" not in run.forced and _settled(run, late):
         return
     for track in run.tracks:
         for kind in track.by_kind():
@@ -30,7 +30,7 @@ def apply(run: Synthesis) -> None:
 
 
 def followed(t_s: FloatArray, force_n: FloatArray, terms: tuple[Creep, ...]) -> FloatArray:
-    """Return the (n,) force that a response follows whose `terms` come late."""
+    """Return the (n,) effective force of a response with the creep `terms`."""
     fractions = [term.fraction.to("1") for term in terms]
     effective: FloatArray = (1.0 - sum(fractions)) * force_n
     for fraction, term in zip(fractions, terms, strict=True):
@@ -49,7 +49,7 @@ def steepest_n_per_s(load: Load) -> float:
 
 
 def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKind, tuple[float, float]]:
-    """Return what leaving creep out changes at most, and the slope behind it, by kind: counts, counts per newton.
+    """Return, by kind, a bound on the change by leaving creep out [count] and the slope it rests on [count/N].
 
     Behind a load that changes at most at a rate ``r`` a lag of time constant ``tau`` stays back by at most ``tau r``.
     So the force is off by at most ``r sum(c_i tau_i)``, and a reading by that times its largest slope: that of the
@@ -95,7 +95,7 @@ def _steepest(track: Track, own: list[int], names: list[str], slopes: FloatArray
 
 
 def _settled(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> bool:
-    """Return whether creep is left out; the plan gets the bound and where it comes from."""
+    """Decide whether creep is left out, enter the decision and its bound into the plan, and return it."""
     found = bounds(run, late)
     hidden = {kind: late[kind].hidden(run.scene.environment.noise_scale) for kind in found}
     most, slope = max(found.values())

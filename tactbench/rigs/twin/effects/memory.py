@@ -1,7 +1,7 @@
 """Linear filters with memory, exact for any step and unconditionally stable.
 
 All follow ``x' = a x + b`` with ``a = exp(-dt / tau)``. Unequal steps use each its own dt; a repeated time stamp has
-dt = 0 and changes nothing. Times ascend: the twin makes them itself.
+dt = 0 and changes nothing. Times must ascend.
 """
 
 from __future__ import annotations

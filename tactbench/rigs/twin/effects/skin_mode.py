@@ -20,7 +20,7 @@ from tactbench.rigs.twin.effects.memory import ComplexArray, recurrence
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of the skin."""
+    """A damped tangential oscillation of the skin under the contact."""
 
     omega: float
     """Undamped angular frequency, rad/s."""
@@ -36,7 +36,7 @@ class Mode:
 
     @property
     def decay(self) -> float:
-        """Rate at which it dies away, 1/s."""
+        """Decay rate of the oscillation, 1/s."""
         return self.damping * self.omega
 
     @property
@@ -57,7 +57,7 @@ def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> 
 
 
 def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
-    """Return the deflection of :func:`swing` for one moment, without arrays: it is asked for once a slip."""
+    """Return the deflection of :func:`swing` at one moment, without arrays: it is evaluated once per slip."""
     w, r = mode.swing, mode.decay
     return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
 
@@ -79,7 +79,7 @@ def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
 
 
 def slip_s(mode: Mode, u: float, speed: float) -> float:
-    """Return how long the slip lasts; infinity if the skin is never caught.
+    """Return the duration of the slip in seconds; infinity if the skin never sticks again.
 
     The velocity rises throughout the half turn after its minimum: one root there, found by Newton steps inside a
     shrinking bracket to the last digits.

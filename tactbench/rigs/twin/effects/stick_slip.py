@@ -1,7 +1,7 @@
 """The skin dragged along: sticking, slipping and steady sliding, event by event, each phase in closed form.
 
 The surface moves at a constant speed; load, contact radius and stiffness change slowly and are straight between the
-nodes of a grid. Nothing is stepped through: a phase ends where its closed form says so.
+nodes of a grid. There are no time steps: the end of a phase is computed in closed form.
 
 - **stick**: the skin moves with the surface, until elastic and viscous force reach ``mu_s N``. The force follows
   Cattaneo and Mindlin.
@@ -35,7 +35,7 @@ _RUNG_OUT = math.log(1e3)
 
 @dataclass(frozen=True)
 class Drive:
-    """What moves over the skin, and what the skin is there."""
+    """The motion of a surface over the skin, and the properties of the contact."""
 
     speed_mm_s: float
     start_s: float
@@ -54,16 +54,16 @@ class Drive:
 
 @dataclass
 class _Phases:
-    """Beginnings of phases and what each needs; a phase lasts to the next one's beginning."""
+    """Phases of the motion, column by column; a phase lasts until the next one begins."""
 
     t_s: list[float] = field(default_factory=list)
     kind: list[int] = field(default_factory=list)
     x_mm: list[float] = field(default_factory=list)
-    """Deflection at its beginning."""
+    """Deflection of the skin at the beginning of the phase."""
     e_mm: list[float] = field(default_factory=list)
-    """Equilibrium of a slip; where the skin that is held after the motion last had tractions in proportion."""
+    """Equilibrium of a slip; of a held skin, the deflection at which tractions were last proportional to pressure."""
     friction: list[float] = field(default_factory=list)
-    """Coefficient of a slip."""
+    """Kinetic friction coefficient of a slip."""
 
     def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0, friction: float = 0.0) -> None:
         self.t_s.append(t_s)
@@ -74,7 +74,7 @@ class _Phases:
 
 
 class Dragged:
-    """The skin under a drive, at any moment.
+    """The state of the dragged skin at any moment.
 
     Parameters
     ----------
@@ -114,12 +114,12 @@ class Dragged:
 
     @property
     def let_go_s(self) -> FloatArray:
-        """(k,) when the skin let go."""
+        """(k,) times at which the skin began to slip."""
         return np.asarray(self._begin[self._kind == SLIP])
 
     @property
     def caught_s(self) -> FloatArray:
-        """(k,) when the surface caught the skin again, or took hold of it for the first time."""
+        """(k,) times at which the skin began to stick."""
         return np.asarray(self._begin[self._kind == STICK])
 
     def _within_slip(self, per_n: FloatArray) -> FloatArray:
