@@ -1,8 +1,8 @@
 """The BioTac's words on SPI: commands, replies and properties to bytes and back.
 
-Nothing here reads, writes or waits. Two public sources state the protocol and agree where not said otherwise: [driver]
+The functions do no input or output. Two public sources state the protocol and agree unless noted otherwise: [driver]
 kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
-the SynTouch BioTac SP product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Tested
+the SynTouch BioTac SP product manual of 26 Oct 2015, which states that the BioTac uses the same protocol. Tested
 against an emulator written from the same sources; it has never met a real sensor.
 
 SPI mode 0, most significant bit first, select active low, 500 kHz to 10 MHz [sourced: both]. The host sends a command
@@ -35,7 +35,7 @@ INDEX: dict[str, int] = {
 """Number of each channel in a sampling command [sourced: driver; Hall on some models, E20 to E24 on the SP: manual]."""
 
 NAMES: dict[int, str] = {index: name for name, index in INDEX.items()}
-"""The same turned round."""
+"""Name of the channel for each number."""
 
 STREAMING_INDEX = 16
 """Switches a sensor to the streaming of protocol 1.1, left only after 5 s without a clock [sourced]: never sent."""
@@ -78,7 +78,7 @@ PROPERTIES: dict[str, Property] = {
 
 
 class Fault(StrEnum):
-    """What can be wrong with one reply."""
+    """Fault of one reply."""
 
     PARITY = "parity"
     RESERVED = "reserved bits"
@@ -91,7 +91,7 @@ class Fault(StrEnum):
 
 
 class Reply(NamedTuple):
-    """One word from the sensor."""
+    """One decoded word from the sensor."""
 
     value: int | None
     """0 to 4095 as received, wrong by a bit under PARITY and RESERVED; None where no datum came."""
@@ -140,7 +140,7 @@ def encoded(count: int) -> bytes:
 
 
 def decoded(word: bytes) -> Reply:
-    """Return what a reply says; any bytes are read, none raises.
+    """Return the decoded reply; no bytes raise an error.
 
     A datum whose first byte became A5 on the line looks like an error reply if 58 follows, and like bad parity
     otherwise: flagged either way.

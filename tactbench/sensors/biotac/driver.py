@@ -33,8 +33,8 @@ cable, port or bridge gone             the reading ends with LinkUnplugged
 
 A gap is never filled. Rows are raw counts.
 
-**Tested** against an emulator written from the same public sources, behind an emulated bridge. It has never met a real
-BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command and
+**Tested** against an emulator written from the same public sources, behind an emulated bridge; not with a real BioTac,
+bridge or spidev. The main assumptions are that the sensor samples at the last bit of its command and
 that a property is read with the pause of a sampling command.
 """
 
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import Link
 
 PATIENCE_S = 0.5
-"""Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""
+"""Time after the end of a batch at which its reply counts as lost [assumed: USB and a busy host take less]."""
 
 
 class BioTacDriver(Driver):
@@ -110,7 +110,7 @@ class BioTacDriver(Driver):
             raise
 
     def _set_up(self) -> None:
-        """Begin at position 0 with nothing under way."""
+        """Reset the state to position 0, with no batch under way."""
         options = self._options
         try:
             self._batches = FrameBatches(
@@ -156,7 +156,7 @@ class BioTacDriver(Driver):
             If the adapter does not answer.
         """
         if self._running:
-            raise RigError("A BioTac that samples was asked who it is.", hint="Ask before start, or after stop.")
+            raise RigError("A BioTac cannot be identified while it samples.", hint="Stop it before.")
         self._property("software version")  # thrown away, as the maker's library does
         found = {}
         for name in ("serial number", "flex version", "software version"):
@@ -214,7 +214,7 @@ class BioTacDriver(Driver):
         return self._batches.blocks()
 
     def _give_up_lost(self) -> None:
-        """Drop what is under way if nothing has come for longer than all of it can take."""
+        """Drop all batches under way if no reply has come for longer than they can take."""
         due_ns = self._ahead * self._batches.timing(0).end_ns + round(PATIENCE_S * 1e9)
         if self._clock() - self._received_ns > due_ns:
             self._link.abandon()
@@ -233,7 +233,7 @@ class BioTacDriver(Driver):
         self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
 
     def _answered(self, reply: SpiReply) -> int | None:
-        """Return the first position of the batch that `reply` is to; those before it are lost. None: to none."""
+        """Return the first position of the batch that `reply` belongs to, or None; batches before it are lost."""
         if reply.number not in (number for number, _ in self._sent):
             return None
         while True:
@@ -243,7 +243,7 @@ class BioTacDriver(Driver):
             self._counts["batches lost"] += 1
 
     def _begun_us(self, counter_us: int, first: int) -> int:
-        """Return when a batch began by the adapter's counter, counted on; note what was not asked for before it."""
+        """Return the adapter's unwrapped counter at the start of a batch; count frames skipped before it."""
         if self._last is None:
             begun_us = counter_us
         else:
@@ -260,7 +260,7 @@ class BioTacDriver(Driver):
         return begun_us
 
     def stop(self) -> None:
-        """Wait for what is under way and drop it."""
+        """Wait for the replies to batches under way and drop them."""
         if not self._running:
             return
         self._running = False

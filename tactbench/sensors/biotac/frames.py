@@ -1,7 +1,7 @@
-"""Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
+"""Frames of the BioTac: commands with their pauses, and conversion of replies to samples of the spec's two streams.
 
-No input or output, no clock of its own: whoever drives the bus asks for the next batch, sends it, and hands back what
-was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
+The classes do no input or output: a driver takes the next batch, sends it, and hands the reply back. Missing samples
+are marked, not interpolated.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FILLER = b"\x00\x00"
 
 
 def quality_of(reply: Reply) -> Quality:
-    """Return what is wrong with a reply as a sample.
+    """Return the quality flag of a reply as a sample.
 
     A word of bad parity keeps the number that came and is SUSPECT: at least one of its bits is wrong. Without a datum a
     sample is MISSING; at either end of the converter it is SATURATED.
@@ -67,9 +67,9 @@ def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | Non
     frame
         Names of channels in the order of their commands.
     rate_hz
-        Commands a second; None: nobody states it.
+        Commands a second; None: unknown.
     source
-        Where the rates are from, if they are not the spec's.
+        Source of the rates, if they differ from the spec.
     """
     found = []
     for stream in STREAMS:
@@ -109,7 +109,7 @@ class FrameRows:
     Raises
     ------
     ValueError
-        If a name is none of the sensor's channels, or there is none.
+        If a name is not a channel of the sensor, or there are no names.
     """
 
     def __init__(self, frame: tuple[str, ...]) -> None:
@@ -144,9 +144,9 @@ class FrameRows:
         position
             Number of its command since the first of all, frame after frame.
         count
-            The datum; of no meaning if MISSING.
+            The datum; ignored if MISSING.
         quality
-            What is wrong with it.
+            Its quality flag.
         t_ns, device_ns
             Its times, nanoseconds of the host's clock and of the adapter's, if they are known. A row has the times of
             its first word.
@@ -179,7 +179,7 @@ class FrameRows:
             self._open[k] = None
 
     def close(self) -> None:
-        """End every row that is begun."""
+        """Complete all begun rows."""
         for k in range(len(self._streams)):
             self._close(k)
 
@@ -247,7 +247,7 @@ class FrameBatches:
     Raises
     ------
     ValueError
-        For a frame that is none, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
+        For a frame, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
     """
 
     def __init__(
@@ -311,15 +311,15 @@ class FrameBatches:
         first
             What :meth:`next` returned with the batch.
         data
-            What came in during each of its steps.
+            Bytes received during each of its steps.
         t_ns
-            When it was in the host.
+            Time at which the host received it.
         device_ns
             When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
             without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
-            if no pause was longer than asked for.
+            if no pause was longer than requested.
         skipped
-            Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
+            Words skipped so far, as whole frames: sequence numbers follow the time.
         """
         sampled_ns, end_ns = self.timing(first)
         for n, (after_ns, word) in enumerate(zip(sampled_ns, data[1::2], strict=True)):
@@ -339,5 +339,5 @@ class FrameBatches:
         return self._rows.blocks()
 
     def close(self) -> None:
-        """End the rows that are begun."""
+        """Complete all begun rows."""
         self._rows.close()

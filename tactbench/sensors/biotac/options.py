@@ -1,4 +1,4 @@
-"""What a rig file says of a BioTac beside its link, and of a log of one."""
+"""Options of a BioTac in a rig file, and of a log."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def _names(given: object) -> object:
 
 
 class BioTacOptions(Options):
-    """Of the driver and the emulator."""
+    """Options of the driver and the emulator."""
 
     select: int = Field(default=1, ge=1, le=0xFF)
-    """Mask of the select lines that are active while this sensor is spoken to, line i being bit i. A board for several
-    sensors may put numbers on its lines: 1, 2, 4 are the first three on the maker's [sourced: driver]."""
+    """Mask of the select lines that are active during transfers with this sensor, line i being bit i. A board for
+    several sensors may put numbers on its lines: 1, 2, 4 are the first three on the maker's [sourced: driver]."""
     frame: Annotated[tuple[str, ...], BeforeValidator(_names)] = DEFAULT_FRAME
     """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
     batch_words: int | None = Field(default=None, ge=1, le=1000)
@@ -34,9 +34,9 @@ class BioTacOptions(Options):
 
 
 class LogOptions(Options):
-    """Of the reader of text logs."""
+    """Options of the reader of text logs."""
 
     sensor: int = Field(default=0, ge=0)
-    """Which pair of columns, from 0."""
+    """Index of the sensor's pair of columns, from 0."""
     rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     """Commands a second, where the log does not state them."""

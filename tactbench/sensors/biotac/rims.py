@@ -22,7 +22,7 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray, RigError
 
 _AXIS, _SIGN = np.array([0, 0, 1, 1]), np.array([[-1], [1], [-1], [1]])
-"""Of a cell's four faces."""
+"""Axis and sign of a cell's four faces."""
 _MOST_DECAYS = 9.0
 """Decay lengths inside the rim beyond which a cell counts as joined perfectly: exp(9) is stiff enough."""
 _LEAST_WAY = 0.02

@@ -23,7 +23,7 @@ _STEP_MM = 0.1
 
 
 class Preparation:
-    """What does not depend on the load: geometry and interpolation."""
+    """Geometry and interpolation, which do not depend on the load."""
 
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
         self.skin, outer, dome = finger_of(sensor)
@@ -48,8 +48,8 @@ class Preparation:
         """Return (n_electrodes,) the share of the drive across the reference resistor, electrodes read one at a time.
 
         ``R_ref / (R_ref + Z_ee)``, the divider of the maker's formula ``Z = (4095 / E - 1) 10 kOhm``. That the others
-        carry no current while one is sampled is derived: the commands address one channel, and no public text says
-        how it is switched.
+        carry no current while one is sampled is derived: the commands address one channel, and no public text
+        states how it is switched.
         """
         resistances = np.diag(self.sheet.resistances(self.film_under(state)))
         return np.asarray(self.reference_per_mm / (self.reference_per_mm + resistances))
@@ -123,7 +123,7 @@ def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -
 
 @lru_cache(maxsize=8)
 def _prepared(sensor: str, x_mm: bytes, s_mm: bytes, refinement: int) -> Preparation:
-    """Specs hold dictionaries and grids arrays: neither can be hashed, their contents can."""
+    """Return the preparation by hashable copies of spec and grid."""
     return Preparation(
         SensorSpec.model_validate_json(sensor), SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), refinement
     )

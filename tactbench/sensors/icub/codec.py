@@ -3,7 +3,7 @@
 A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
 [sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
 ``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
-(IM: ``CanBusSkin.cpp``) unless said. Nothing here has met a real board.
+(IM: ``CanBusSkin.cpp``) unless stated otherwise. None of it has been tested with a real board.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
 
 @dataclass(frozen=True)
 class BoardSetup:
-    """Skin type, period and reading at rest; the board then has no triangle enabled [sourced: IF theSkin].
+    """Command that sets skin type, period and reading at rest, and disables all triangles [sourced: IF theSkin].
 
     Types: 0 compensated for temperature, 1 palm and fingertip, 2 not compensated, 3 hand of the ergoCub, 7 raw test,
     8 compensated, version 2. The defaults are IM's (the firmware's own: 50 ms, 245) with type 1.
@@ -48,10 +48,10 @@ class BoardSetup:
 
 @dataclass(frozen=True)
 class TriangleSetup:
-    """Shift, converter offset and enabling of triangles `first` to `last`.
+    """Command that sets shift and converter offset of triangles `first` to `last`, and enables or disables them.
 
-    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. A range
-    that does not ascend within 0 to 15 is passed over [sourced: IF theSkin].
+    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. It ignores
+    a range that does not ascend within 0 to 15 [sourced: IF theSkin].
     """
 
     first: int = 0
@@ -63,14 +63,14 @@ class TriangleSetup:
 
 @dataclass(frozen=True)
 class Transmit:
-    """Start or stop sending."""
+    """Command to start or stop sending."""
 
     on: bool
 
 
 @dataclass(frozen=True)
 class VersionRequest:
-    """Ask for the firmware's version, naming the protocol that is needed: the only command with an answer."""
+    """Request for the firmware's version, with the protocol that the host needs: the only command with an answer."""
 
     major: int = 2
     minor: int = 0
@@ -88,7 +88,7 @@ class Version:
     firmware: tuple[int, int, int]
     protocol: tuple[int, int]
     fits: bool
-    """The board speaks the protocol asked for."""
+    """Whether the board supports the requested protocol."""
 
 
 def polling_id(board: int, source: int = 0) -> int:
@@ -161,7 +161,7 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 def skin_frames(
     board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
-    """Return head and tail.
+    """Return the head and the tail frame of a sample.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
 
 @dataclass(frozen=True)
 class Sample:
-    """12 taxels of one triangle; nothing in it is interpolated or carried over from another sample."""
+    """The 12 taxels of one triangle, without interpolated values or values of other samples."""
 
     board: int
     triangle: int
@@ -228,16 +228,16 @@ class _Triangle:
     counts: Counter[str] = field(default_factory=Counter)
     samples: int = 0
     head: CanFrame | None = None
-    """Waits for its tail."""
+    """Head that waits for its tail."""
     tail: CanFrame | None = None
-    """The last one."""
+    """The last tail."""
     doubled: tuple[int, ...] = ()
     """Taxels of frames that came twice since the last sample."""
     last_ns: int | None = None
 
 
 class SkinDecoder:
-    """From frames, as they come from a bus or a log, to samples.
+    """Converts frames of a bus or a log to samples.
 
     A head and the tail behind it make a sample: frames keep their order on the bus. Half a period apart or more, all
     its taxels are SUSPECT; nine tenths, they are of two samples whose other halves were lost. Two heads or two tails in
@@ -249,7 +249,7 @@ class SkinDecoder:
     A taxel out of range or at 0 or 255 is SATURATED, one out of range also SUSPECT (the board's own test for broken
     taxels). No acknowledgement and reserved bits make all taxels SUSPECT, not connected makes all MISSING. A doubled
     frame makes its taxels SUSPECT in the sample it is found before. A board in the raw test (type 7) sends the low
-    bytes of its results, which nothing in the frames tells from readings.
+    bytes of its results, which cannot be distinguished from readings.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ class SkinDecoder:
         (board, triangle) -> counts of what was wrong, by the names that a recording has. "Long intervals" are samples
         more than 1.5 periods after the one before: both frames were lost, or the host was late.
     foreign
-        Frames that were no skin data.
+        Number of frames without skin data.
 
     Raises
     ------

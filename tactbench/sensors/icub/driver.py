@@ -33,11 +33,11 @@ from tactbench.sensors.icub.codec import (
 from tactbench.sensors.icub.options import FingertipOptions
 
 SETTLE_S = 0.5
-"""From the set-up to the start: the board takes its baseline [sourced: icub-main CanBusSkin.cpp waits as long]."""
+"""Time from set-up to start, in which the board takes its baseline [sourced: icub-main CanBusSkin.cpp]."""
 ANSWER_S = 0.5
-"""Until a version is missed [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
+"""Timeout of the answer with the version [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
 MOST_FRAMES = 4096
-"""Taken by one call of `read`: a bus that never rests does not keep it for ever. 0.5 s of a full bus."""
+"""Limit on the frames of one call of `read`, so that it returns on a busy bus: 0.5 s of a full bus."""
 
 
 class FingertipDriver(Driver):
@@ -70,7 +70,7 @@ class FingertipDriver(Driver):
         self._sent: set[tuple[int, bytes]] = set()
         self._sampling = False
         self._earlier: Counter[str] = Counter()
-        """Counts of what was read before the last start."""
+        """Counts from before the last start."""
         self._others = 0
         self._decoder = self._fresh_decoder()
         self._link = open_for(settings, "icub", CanLink, "can://socketcan/can0")  # type: ignore[type-abstract]
@@ -91,7 +91,7 @@ class FingertipDriver(Driver):
         Raises
         ------
         LinkTimeout
-            If nobody on the bus acknowledges (socketcan).
+            If no device on the bus acknowledges (socketcan).
         LinkUnplugged
             If the adapter is gone.
         """
@@ -109,7 +109,7 @@ class FingertipDriver(Driver):
                 version = answer[1]
                 protocol = "{}.{}".format(*version.protocol)
                 if not version.fits:
-                    protocol += f" (not {request.major}.{request.minor}, which was asked for)"
+                    protocol += f" (not {request.major}.{request.minor}, which was requested)"
                 model = "MTB4" if version.board_type == 11 else f"type {version.board_type}"
                 return {**about, "model": model, "firmware": "{}.{}.{}".format(*version.firmware), "protocol": protocol}
         return {
@@ -176,7 +176,7 @@ class FingertipDriver(Driver):
         return SkinDecoder(self._options.period_s)
 
     def _counted(self) -> Counter[str]:
-        """Return what the decoder has counted; it is given frames of one triangle only."""
+        """Return the counts of the decoder, which gets frames of one triangle only."""
         found = Counter({"frames that are no skin data": self._decoder.foreign})
         for counts in self._decoder.counts.values():
             found.update(counts)

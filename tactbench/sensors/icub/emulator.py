@@ -1,4 +1,4 @@
-"""A board with an iCub fingertip, alone on a CAN bus, as a model without input or output: frames in, frames out.
+"""Emulator of a board with an iCub fingertip, alone on a CAN bus; it maps received frames to sent frames.
 
 What the board does is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
 ``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; where the model guesses, it is
@@ -61,7 +61,7 @@ _CHANNELS = tuple(_REST)
 
 @dataclass(frozen=True)
 class BoardFault(Fault):
-    """Something wrong with a board; nothing is random.
+    """A fault of a board; faults are deterministic.
 
     `every` counts frames, of those that are dropped, doubled or late.
 
@@ -83,7 +83,7 @@ class BoardFault(Fault):
     }
 
     half: Literal["head", "tail"] | None = None
-    """Which frames are dropped, doubled or late; None: both."""
+    """Half of the samples whose frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
     """Bits of the error word."""
@@ -119,7 +119,7 @@ class Bus(DeviceEmulator):
     board, triangle
         Where the fingertip is; the board's other triangles have no chip.
     faults
-        What is wrong with the board; the list may be changed at any time.
+        Faults of the board; the list may be changed at any time.
     """
 
     def __init__(self, senses: Senses, *, board: int = 14, triangle: int = 0, faults: Iterable[BoardFault] = ()):
@@ -134,7 +134,7 @@ class Bus(DeviceEmulator):
         self._forget()
 
     def _forget(self) -> None:
-        """Take the firmware's defaults."""
+        """Reset the set-up to the firmware's defaults."""
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
         self._shift = 2
         self._enabled = set(range(16))
@@ -145,7 +145,7 @@ class Bus(DeviceEmulator):
         return min(self._reads_s, self._first_end_s())
 
     def _first_end_s(self) -> float:
-        """Return when the first of the frames that leave has left."""
+        """Return the time at which the first queued frame is sent."""
         if not self._leaving:
             return math.inf
         ready_s, _, frame = self._leaving[0]
@@ -197,14 +197,14 @@ class Bus(DeviceEmulator):
         self._reads_s = now_s + period_s if period_s else math.inf
 
     def _unplugged(self, now_s: float) -> bool:
-        """Return whether it is without power, after which nothing of its set-up is left."""
+        """Return whether the board is without power, which resets its set-up."""
         if not any(fault.name == "unplugged" and fault.active(now_s) for fault in self.faults):
             return False
         self._forget()
         return True
 
     def _read(self) -> None:
-        """Read the chips when that is due, and send head and tail of every enabled triangle."""
+        """Read the chips, and send head and tail of every enabled triangle."""
         now_s = self._reads_s
         if self._unplugged(now_s):
             return
@@ -246,7 +246,7 @@ class Bus(DeviceEmulator):
         return taxels, word
 
     def _send(self, frames: Iterable[CanFrame], now_s: float) -> None:
-        """Make frames ready for the bus, after faults of sending."""
+        """Queue frames for the bus, after applying the faults of sending."""
         for frame in frames:
             half = {HEAD: "head", TAIL: "tail"}.get(frame.data[0])
             copies, ready_s = 1, now_s

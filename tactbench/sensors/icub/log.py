@@ -1,4 +1,4 @@
-"""CAN logs of a bus with a fingertip, as samples."""
+"""Reader of CAN logs of a bus with a fingertip."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     """Read one fingertip's samples from a log in a format of python-can: candump's, Vector's ASC and BLF, ...
 
     Times count from the log's first message. Samples are those that the driver makes of the same frames; one whose
-    time is not after that of the sample before it is kept out and counted. Buses of a log of several are not told
-    apart.
+    time is not after that of the sample before it is kept out and counted. Several buses in one log are not
+    distinguished.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
 
 
 def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
-    """Return the one (board, triangle) of `there` that fits `wanted`."""
+    """Return the one (board, triangle) of `there` that matches the options."""
     fitting = [
         (board, triangle)
         for board, triangle in there
@@ -114,7 +114,7 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
 
 
 def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
-    """Return the period in seconds, and where it is from."""
+    """Return the period in seconds and its source."""
     if settings.period_ms is not None:
         text = f"{settings.period_ms} ms between samples by the option period_ms"
         return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
@@ -122,7 +122,7 @@ def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[f
     steps = steps[steps > 0]
     if not len(steps):
         raise UsageError(
-            f"{path} has too few samples to tell their period.", hint="State it with the option period_ms."
+            f"{path} has too few samples to determine their period.", hint="State it with the option period_ms."
         )
     period_s = 1e-9 * float(np.median(steps))
     text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"

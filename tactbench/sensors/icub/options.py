@@ -1,4 +1,4 @@
-"""What a rig file may say of a fingertip, and what may be said of a log of its bus."""
+"""Options of a fingertip in a rig file, and of a log of its bus."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FingertipOptions(Options):
     shift: int = Field(default=0, ge=0, le=7)
     """One count is ``2**shift`` results of the converter."""
     cdc_offset: int = Field(default=0x2000, ge=0, le=0xFFFF)
-    """Of the converter, as the AD7147 takes it."""
+    """Offset of the converter, in the units of the AD7147."""
 
     @property
     def period_s(self) -> float:
@@ -40,7 +40,7 @@ class FingertipOptions(Options):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands that set the board up, in order; afterwards the board takes a baseline and does not send.
+        """Commands that set the board up, in order; afterwards it takes a baseline and does not send.
 
         [sourced: icub-main CanBusSkin.cpp; the stop at the beginning is added because the board may be sending]
         """
@@ -52,7 +52,7 @@ class FingertipOptions(Options):
 
 
 class LogOptions(Options):
-    """Which triangle of a log is the fingertip, and what the log does not say."""
+    """Options of a log: the triangle of the fingertip, and the period."""
 
     board: int | None = Field(default=None, ge=0, le=14)
     """None: the only one in the log."""
