@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, Indenter, RigError
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
@@ -67,17 +66,6 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
     s: FloatArray = np.asarray(-arc / 2 + (np.arange(across) + 0.5) * ds, dtype=np.float64)
     return SkinGrid(x_mm=x, s_mm=s)
-
-
-def pad_of(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_] | None:
-    """Return which (nx, ns) cells belong to the active part; None where the whole sheet does."""
-    if sheet.pad is None:
-        return None
-    low, high, arc = (edge.to("mm") for edge in sheet.pad)
-    inside: npt.NDArray[np.bool_] = ((grid.x_mm >= low) & (grid.x_mm <= high))[:, None] & (
-        np.abs(grid.s_mm) <= arc / 2
-    )[None, :]
-    return inside
 
 
 def outer_radius_mm(sheet: SkinSheet) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,7 +30,7 @@ from tactbench.plugin import (
     StreamSpec,
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
-from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
@@ -166,9 +167,22 @@ class Twin:
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
-        from tactbench.rigs.twin.costing import explained
-
-        return explained(self.indenters, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
+        plan = self.plan(sensor, scene)
+        if not rounds:
+            return [Explained(entry, None) for entry in plan.entries]
+        runs = []
+        for _ in range(rounds + 1):
+            forget_tables()
+            runs.append(carried_out(sensor, scene, 1, plan, DEFAULT, self.indenters))
+        del runs[0]  # its times include imports
+        forget_tables()  # the next recording of the scene solves its contact itself
+        rows = []
+        for entry in plan.settled(runs[-1].settled):
+            if entry.included and entry.effect not in plan.lent:
+                rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))
+            else:
+                rows.append(Explained(entry, None, "part of the contact" if entry.included else ""))
+        return rows
 
 
 def build(context: RigContext) -> Twin:

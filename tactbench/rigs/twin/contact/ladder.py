@@ -45,19 +45,12 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
 
 
 def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: float) -> tuple[str, float]:
-    known: dict[str, FloatArray | None] = {}
-
-    def readings(name: str) -> FloatArray | None:
-        if name not in known:
-            known[name] = _probed(run, names, largest_n, name)
-        return known[name]
-
-    error = float("inf")
+    error, own = float("inf"), _probed(run, names, largest_n, next(iter(RUNGS)))
     for low, high in itertools.pairwise(RUNGS):
-        own, finer = readings(low), readings(high)
-        if own is None or finer is None:
+        coarser, own = own, _probed(run, names, largest_n, high)
+        if coarser is None or own is None:
             continue
-        error = float(np.max(np.abs(own - finer)))
+        error = float(np.max(np.abs(coarser - own)))
         if error <= (1 - TABLE_SHARE) * tolerance:
             return low, error
     last = list(RUNGS)[-1]
@@ -65,7 +58,7 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
         return last, error / 2
     raise RigError(
         f"No rung of the ladder keeps an error of {tolerance:g} here: the finest is off by about {error / 2:.2g}.",
-        hint="Ask for a larger tolerance, or a sensor spec with more cells.",
+        hint="Give a larger tolerance, or a sensor spec with more cells.",
     )
 
 

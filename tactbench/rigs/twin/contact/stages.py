@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid, surface_of
+from tactbench.rigs.twin.geometry import check_contact, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ class _Tabulated:
     slide: SlideTable | None
     touched_core: bool
     closing_mm: float
-    film_mm: float
     remarks: Mapping[str, Scalar]
 
 
@@ -95,7 +94,7 @@ def skin_under_load(run: Synthesis) -> LoadTable:
 
 def _tables(run: Synthesis) -> _Tabulated:
     largest, names = run.load.largest_n, read_names(run)
-    if run.scene.simulation.tolerance is not None and run.rung_error is None:
+    if run.rung_error is None:
         choose_rung(run, names, largest)
     tabulated = _tabulated(run, names, largest)
     _report(run, tabulated)
@@ -175,15 +174,11 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
 
         sliding = build_slide_table(press, read, table, run.skin, *slide)
     slide_s = run.clock() - began
-    medium = press.medium
-    closing = press.closing_at(largest) if medium.has_core else 0.0
-    film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
-    sheet = run.skin.sheet
-    outer_mm, dome, relief = surface_of(sheet)
+    closing = press.closing_at(largest)
     if within_reach:
-        check_reach(press, largest, outer_mm, dome, relief)
-    remarked = remarks(press, table.loads_n.tolist(), outer_mm, pad_of(sheet, medium.grid), dome, relief)
-    tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, remarked)
+        check_reach(press, largest, run.skin.sheet)
+    remarked = remarks(press, table.loads_n.tolist(), run.skin.sheet)
+    tabulated = _Tabulated(table, sliding, press.touched_core, closing, remarked)
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
 
 
@@ -229,16 +224,10 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         run.drawn.update(rung=run.rung, rung_error_count=run.rung_error, error_estimate_count=total)
     if "core" not in run.lent:
         return
-    force = deepest.force_n
     if table.touch_down_n is not None:
         low, high = table.touch_down_n
         run.drawn["touch_down_n"] = (low + high) / 2
         run.settled["core"] = Settled(True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N", None)
     elif not tabulated.touched_core:
-        sure = deepest.depth_mm < tabulated.film_mm
-        number = (
-            f"depth {deepest.depth_mm:.2f} mm < {tabulated.film_mm:.2f} mm"
-            if sure
-            else f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
-        )
-        run.settled["core"] = Settled(False, f"never touches the core below {force:g} N: {number}")
+        left = f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
+        run.settled["core"] = Settled(False, f"never touches the core below {deepest.force_n:g} N: {left}")

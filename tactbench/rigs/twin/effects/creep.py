@@ -18,7 +18,8 @@ def apply(run: Synthesis) -> None:
     It is left out, and the plan is updated, where it changes no reading by more than a third of noise and rounding
     (:func:`bounds`), unless the scene asks for it by name or has a motor's force loop.
     """
-    late = {kind: stated for track in run.tracks for kind in track.by_kind() if (stated := _creeping(run, kind))}
+    stated = {kind: run.nuisances(kind) for track in run.tracks for kind in track.by_kind()}
+    late = {kind: one for kind, one in stated.items() if one is not None and one.creep}
     if late and run.scene.drive is None and "creep" not in run.forced and _settled(run, late):
         return
     for track in run.tracks:
@@ -64,9 +65,10 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
             if kind not in late:
                 continue
             late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in late[kind].creep)
-            slope = (
-                _steepest(track, own, names, table.steepest(*_visited(track))) if kind in READ_FROM_THE_SKIN else np.inf
-            )
+            slope = np.inf
+            if kind in READ_FROM_THE_SKIN:
+                steepest = table.steepest(float(track.force_n.min()), float(track.force_n.max()))
+                slope = _steepest(track, own, names, steepest)
             slope *= _stretch(run) if kind == "taxel" else 1.0
             found[kind] = max(found.get(kind, (0.0, 0.0)), (slope * late_s * rate, slope))
     return found
@@ -78,15 +80,6 @@ def _stretch(run: Synthesis) -> float:
     from tactbench.rigs.twin.effects.heat import largest_stretch
 
     return largest_stretch(run)
-
-
-def _creeping(run: Synthesis, kind: ChannelKind) -> Nuisances | None:
-    stated = run.nuisances(kind)
-    return stated if stated is not None and stated.creep else None
-
-
-def _visited(track: Track) -> tuple[float, float]:
-    return float(track.force_n.min()), float(track.force_n.max())
 
 
 def _steepest(track: Track, own: list[int], names: list[str], slopes: FloatArray) -> float:

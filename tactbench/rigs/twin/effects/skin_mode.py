@@ -62,13 +62,6 @@ def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> floa
     return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
 
 
-def _turn(mode: Mode, u: float, speed: float) -> float:
-    """Return the phase at which the velocity is lowest, between 0 and pi; half a turn later it is highest."""
-    w, r = mode.swing, mode.decay
-    back = (mode.omega**2 * u + r * speed) / w
-    return math.atan2(r * speed + back * w, r * back - speed * w)
-
-
 def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
     """Return (n,) whether a slip that begins at `u` (n,) ever reaches the surface's speed again."""
     w, r = mode.swing, mode.decay
@@ -88,7 +81,7 @@ def slip_s(mode: Mode, u: float, speed: float) -> float:
     back = (mode.omega**2 * u + r * speed) / w
     if not u > 0:
         return math.inf
-    low = _turn(mode, u, speed) / w
+    low = math.atan2(r * speed + back * w, r * back - speed * w) / w
     high = low + math.pi / w
 
     def excess(t: float) -> tuple[float, float]:
