@@ -16,13 +16,7 @@ from tactbench.rigs.twin.contact.spectrum import LowModes
 
 
 class Preconditioner:
-    """Approximate inverse of the Hessian in deflection and approach.
-
-    Parameters
-    ----------
-    medium
-        The skin; its softest ``medium.low_modes`` pairs of modes are solved exactly.
-    """
+    """Approximate inverse of the Hessian in deflection and approach, with ``medium.low_modes`` exact pairs of modes."""
 
     def __init__(self, medium: Medium) -> None:
         from scipy.linalg import lapack

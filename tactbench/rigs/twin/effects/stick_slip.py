@@ -74,13 +74,7 @@ class _Phases:
 
 
 class Dragged:
-    """The state of the dragged skin at any moment.
-
-    Parameters
-    ----------
-    drive
-        The motion and the skin.
-    """
+    """The state of the skin that a `drive` drags, at any moment."""
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
