@@ -15,15 +15,7 @@ GRACE_S = 5.0
 
 
 class Recorder:
-    """Makes recordings one after the other; their rig is built once.
-
-    Parameters
-    ----------
-    registry
-        Registry from which the rig is built.
-    operator
-        Operator of a rig of real devices.
-    """
+    """Makes recordings one after the other; their rig, from `registry`, is built once."""
 
     def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator

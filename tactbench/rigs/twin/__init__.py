@@ -112,7 +112,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
 
 @hookimpl
 def tactbench_indenters() -> list[IndenterDescriptor]:
-    """Offer the usual shapes. A cap and a flat surface stand in a scene as a radius or none."""
+    """Offer the usual shapes; scenes store a cap or a flat surface as a radius or its absence."""
     radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
     return [
         _indenter("cap", "Spherical cap", radius=radius),

@@ -39,10 +39,10 @@ from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
 _CURVE_POINTS = 4001
-"""Of a press curve; straight between them, the force is off by less than 1e-4 of the largest, as in force_loop."""
+"""Points of a press curve; interpolated linearly, the force is off by less than 1e-4 of the largest."""
 REFERENCE_STREAM = "force_torque"
 _PLACE_CHANNELS = tuple(ChannelSpec(name=name, kind="position", unit="m") for name in ("x", "y"))
-"""On the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
+"""Place on the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
 _ONE_CLOCK = Source(
     tag="assumed",
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
@@ -71,7 +71,7 @@ class TwinAcquisition:
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
     samples: Mapping[str, Samples] = field(repr=False)
-    """By name of the stream."""
+    """Samples by name of the stream."""
     run: Synthesis = field(repr=False)
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:

@@ -80,8 +80,8 @@ class Settled(NamedTuple):
     included: bool
     reason: str
     change: float | None = 0.0
-    """What leaving it out changes in an observed channel [the plan entry's unit]: at most, if it was; about, if it was
-    not; None: not known."""
+    """Change of an observed channel by leaving it out [the plan entry's unit]: a bound for effects left out, an
+    estimate for others; None: not known."""
 
 
 @dataclass
@@ -91,7 +91,7 @@ class Track:
     clock: str
     """Name of the stream whose own clock it is; empty: the scene's reference clock."""
     channels: tuple[ChannelSpec, ...]
-    """In order of the sensor's streams."""
+    """Channels in the order of the sensor's streams."""
     t_s: FloatArray
     """(n,) seconds since the recording's first sample."""
     force_n: FloatArray
@@ -103,7 +103,7 @@ class Track:
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
     """(n,) force that the response of a kind of channel follows, where it differs from the true one."""
     vibration_mm: FloatArray | None = None
-    """(n,) motion of the skin along its normal, beyond what the load explains; None: nothing shakes it."""
+    """(n,) vibration of the skin along its normal; None if there is none."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
     warmth_k: FloatArray | None = None
@@ -150,9 +150,9 @@ class Synthesis:
     sliding: Callable[[FloatArray], Tangential] | None = None
     """Function from (n,) seconds to the tangential state; None if nothing slides."""
     lent: dict[str, str] = field(default_factory=dict)
-    """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
+    """Effects that the solver may apply: name -> ``module:callable``."""
     settled: dict[str, Settled] = field(default_factory=dict)
-    """Plan entries that only the solve could decide, by name."""
+    """Plan entries that were decided after the contact was solved, by name."""
     forced: frozenset[str] = frozenset()
     """Effects that the scene includes by name: they are applied whatever the solution of the contact."""
     fidelity: Fidelity = DEFAULT
@@ -160,18 +160,18 @@ class Synthesis:
     rung: str = ""
     """Name of the rung that was chosen to keep a tolerance."""
     rung_error: float | None = None
-    """Its estimated error in the worst observed channel, in the channel's unit; None: not estimated."""
+    """Estimated error of the rung in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """Random draws and achieved accuracies that the recording keeps."""
     clock: Callable[[], float] = time.perf_counter
-    """Seconds, monotonic."""
+    """Monotonic clock, in seconds."""
     spent_s: dict[str, float] = field(default_factory=dict)
-    """Seconds each applied effect took: an effect that is not here was not stepped."""
+    """Seconds spent on each applied effect."""
     elsewhere_s: float = 0.0
-    """Seconds that the effect being applied spent on work booked under another one."""
+    """Seconds of the present effect that are counted under another one."""
 
     def apply(self, effect: EffectDescriptor) -> None:
-        """Apply one effect, and book what it takes."""
+        """Apply one effect, and count the seconds that it takes."""
         began, self.elsewhere_s = self.clock(), 0.0
         load_object(effect.where)(self)
         own = self.clock() - began - self.elsewhere_s
@@ -202,16 +202,16 @@ class Synthesis:
         return self.sensor.spec.nuisances.get(kind)
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator of what belongs to this sensor unit: the same in every recording of it under a seed."""
+        """Return the generator of properties of this sensor unit, which all its recordings under a seed share."""
         scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
         return generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
-        """Return the generator of what the recordings of a session share."""
+        """Return the generator of properties that the recordings of a session share."""
         return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator of what is this recording's own."""
+        """Return the generator of properties of this recording alone."""
         return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:

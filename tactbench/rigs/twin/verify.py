@@ -43,7 +43,7 @@ def verdicts() -> Iterator[Verdict]:
 
 
 def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
-    """Return what the effects left out of `scene` change, and at most may change by the plan: counts.
+    """Return the change [count] by the effects left out of `scene`, and the bound on it by the plan.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
 def _pressed(
     poisson: float, thickness_mm: float, side_mm: float, cells: int, penalty: float, force_n: float
 ) -> SkinState:
-    """Return a bonded layer of E = 1 MPa under a paraboloid, solved as every recording is; its depth from the apex."""
+    """Return the state of a bonded layer, E = 1 MPa, under a paraboloid; its depth is counted from the apex."""
     why = "an exercise"
     half, arc = assumed(side_mm / 2, "mm", why), assumed(side_mm, "mm", why)
     skin = BondedLayer(

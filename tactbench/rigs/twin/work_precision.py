@@ -44,7 +44,7 @@ _REFERENCE = RUNGS["reference"]
 def study(
     sensor: SensorDescriptor, clock: Callable[[], float] = time.process_time, *, rounds: int = ROUNDS
 ) -> CostStudy:
-    """Return the diagram of one sensor, still to be measured, every recording timed `rounds` times.
+    """Return the jobs that measure the diagram of one sensor; every recording is timed `rounds` times.
 
     A job raises the error of a rung that does not support the skin.
 

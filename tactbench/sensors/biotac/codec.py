@@ -1,4 +1,4 @@
-"""The BioTac's words on SPI: commands, replies and properties to bytes and back.
+"""The BioTac's protocol on SPI: conversion of commands, replies and properties to bytes and back.
 
 The functions do no input or output. Two public sources state the protocol and agree unless noted otherwise: [driver]
 kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
@@ -38,7 +38,7 @@ NAMES: dict[int, str] = {index: name for name, index in INDEX.items()}
 """Name of the channel for each number."""
 
 STREAMING_INDEX = 16
-"""Switches a sensor to the streaming of protocol 1.1, left only after 5 s without a clock [sourced]: never sent."""
+"""Command that starts the streaming of protocol 1.1, which ends after 5 s without a clock [sourced]; it is not used."""
 
 CHANNELS: tuple[str, ...] = tuple(channel.name for stream in STREAMS for channel in stream.channels)
 """The channels of the model with 19 electrodes, in the order of the spec's streams."""
@@ -82,7 +82,7 @@ class Fault(StrEnum):
 
     PARITY = "parity"
     RESERVED = "reserved bits"
-    """Parity holds, but a bit that is always 0 is not."""
+    """Parity holds, but a reserved bit is not 0."""
     ERROR = "error reply"
     NOT_CONNECTED = "not connected"
     """The line was held low or high throughout: 00 00 or FF FF, both of bad parity."""
@@ -159,7 +159,7 @@ def decoded(word: bytes) -> Reply:
 
 
 def property_text(name: str, raw: bytes) -> str | None:
-    """Return a property as the maker's tools show it; None if `raw` is none, as from a sensor that is not there.
+    """Return a property as the maker's tools show it; None if `raw` is not valid, as without a sensor.
 
     Parameters
     ----------

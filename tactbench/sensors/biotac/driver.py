@@ -1,4 +1,4 @@
-"""Driver of the BioTac: batches of SPI transfers in, blocks of counts out.
+"""Driver of the BioTac, which samples it by batches of SPI transfers.
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
 every byte, so something must keep the time of 4400 words a second. That is an SPI bridge (``spi://bridge/…``, a
@@ -78,7 +78,7 @@ PATIENCE_S = 0.5
 
 
 class BioTacDriver(Driver):
-    """One BioTac.
+    """Driver of one BioTac.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class BioTacDriver(Driver):
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The spec's streams, or those channels of theirs that the frame has, at its rates."""
+        """The spec's streams, with the channels and rates of the frame."""
         rate_hz = COMMAND_RATE.to("Hz")
         source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self._options.frame)}")
         return streams_of(self._options.frame, rate_hz, source)
@@ -183,7 +183,7 @@ class BioTacDriver(Driver):
                 return reply.data[1]
 
     def start(self) -> None:
-        """Send the first batches; sequence numbers begin at 0, times by the adapter's counter where that stands."""
+        """Send the first batches; sequence numbers begin at 0, the adapter's counter continues."""
         if not self._running:
             self._counts = Counter(self.counts)
             self._set_up()
@@ -196,7 +196,7 @@ class BioTacDriver(Driver):
             self._sent.append((self._link.send(steps), first))
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the frames that are over; see :class:`Driver`. Nothing while it is stopped.
+        """Return the completed frames, see :class:`Driver`; nothing while the driver is stopped.
 
         An adapter without a program of its own carries out a batch in here: then it takes a batch's time at least.
         """

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatorSettings, Senses
 
 _ROUNDING_S = 1e-9
-"""Seconds as float64 are 0.1 ns apart after eleven days, and a host's sum of pauses rounds more than once."""
+"""Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""
 
 _IDLE = b"\xff"
-"""What is on the line while the sensor does not drive it [assumed: high]."""
+"""Level of the line while the sensor does not drive it [assumed: high]."""
 
 _FILLERS = (0x00, 0x01)
 """First byte that a host sends while it reads: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual, and a public
@@ -104,11 +104,11 @@ DEFAULT_PROPERTIES: Mapping[str, bytes] = {
     "software version": b"0238",
     "serial number": b"BT2P0220B11E0004",
 }
-"""As in the maker's examples [sourced: QuickStart Guide]."""
+"""Properties of the maker's examples [sourced: QuickStart Guide]."""
 
 
 class Emulator(SpiDeviceEmulator):
-    """One BioTac on an SPI bus.
+    """Emulated BioTac on an SPI bus.
 
     A sampling command samples at its last bit; the word is read after the pause. Several sensors that are selected
     together are several emulators that get the same bytes.
@@ -149,7 +149,7 @@ class Emulator(SpiDeviceEmulator):
         self._held: dict[tuple[BioTacFault, str], int] = {}
 
     def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
-        """Return what is on the line while the host clocks `data` in: as many bytes.
+        """Return the bytes that the host receives while it sends `data`.
 
         Parameters
         ----------
@@ -258,7 +258,7 @@ class Emulator(SpiDeviceEmulator):
 
 
 def build_emulator(settings: EmulatorSettings) -> Emulator:
-    """Return a sensor with what is sensed, as ``SensorDescriptor.emulator`` promises; it draws nothing.
+    """Return a sensor with the given senses, as ``SensorDescriptor.emulator`` promises; it uses no random numbers.
 
     The clock of the bus is unknown here; with the fastest one that a sensor allows, no pause of 50 us is too short;
     at 4.4 MHz it samples 2 us early and lets a pause pass that is 2 us too short.

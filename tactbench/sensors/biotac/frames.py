@@ -38,7 +38,7 @@ DEFAULT_FRAME: tuple[str, ...] = tuple(
 """44 commands, every second one PAC [sourced: kth-ros-pkg/biotac_driver, BT_FRAME_STRUCTURE_DEFAULT]."""
 
 FILLER = b"\x00\x00"
-"""Sent while a word is read [sourced: driver]."""
+"""Bytes sent while a word is read [sourced: driver]."""
 
 
 def quality_of(reply: Reply) -> Quality:
@@ -60,7 +60,7 @@ def counted(faults: Mapping[str, Counter[Fault]]) -> dict[str, int]:
 
 
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
-    """Return the spec's streams as a frame fills them: with its channels only, at its rates.
+    """Return the spec's streams with the channels and rates of a frame.
 
     Parameters
     ----------
@@ -211,10 +211,10 @@ def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
 
 
 class Timing(NamedTuple):
-    """When the words of a batch are sampled and when the batch is over, nanoseconds from its beginning."""
+    """Times of the words and of the end of a batch, nanoseconds from its beginning."""
 
     sampled_ns: tuple[int, ...]
-    """A word is sampled at the last bit of its command [assumed]."""
+    """Times at which the words are sampled: at the last bits of their commands [assumed]."""
     end_ns: int
 
 

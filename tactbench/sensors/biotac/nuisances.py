@@ -119,5 +119,5 @@ HARD_HANDLED = Scenario(
         ),
     },
 )
-"""The levels that were read off recordings with hard presses in between, the warm-up counted among them. A session of
+"""Nuisances read off recordings with hard presses in between, warm-up included. A session of
 this kind has larger offsets than the usual one; its values bound from above what such handling does."""

@@ -30,7 +30,7 @@ class BioTacOptions(Options):
     batch_words: int | None = Field(default=None, ge=1, le=1000)
     """Words in a batch; None: a frame. Fewer where a bridge takes only short batches: a word is 14 bytes of payload."""
     batches_ahead: int = Field(default=8, ge=2, le=16)
-    """Batches under way at once, as far as the adapter holds them: so long may the host be late without a gap."""
+    """Batches under way at once, as far as the adapter holds them; they bridge delays of the host without a gap."""
 
 
 class LogOptions(Options):

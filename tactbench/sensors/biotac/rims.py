@@ -39,9 +39,9 @@ class Disc(NamedTuple):
     x_mm: float
     s_mm: float
     radius_mm: float
-    """In the film's own metric."""
+    """Radius in the metric of the film."""
     stretch: tuple[float, float] = (1.0, 1.0)
-    """Millimetres of the film for one of the grid's, along x and s, there."""
+    """Local stretch of the film relative to the grid, along x and s."""
 
 
 class RimmedDiscs:

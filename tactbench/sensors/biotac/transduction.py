@@ -1,4 +1,4 @@
-"""From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
+"""Conversion of skin states to the BioTac's counts: film, conduction, divider, and the fluid's pressure.
 
 It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin: effects of the twin give them.
 """
@@ -19,7 +19,7 @@ from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
 
 _STEP_MM = 0.1
-"""Over which the film's stretch under a disc is taken: an eighth of the disc or less."""
+"""Step over which the film's stretch under a disc is computed: an eighth of the disc or less."""
 
 
 class Preparation:

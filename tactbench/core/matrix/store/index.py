@@ -45,13 +45,7 @@ PRAGMA user_version = {VERSION};
 
 
 class Index:
-    """The index of one result folder; opened when made.
-
-    Parameters
-    ----------
-    folder
-        The result folder.
-    """
+    """The index of the result folder `folder`, opened at once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

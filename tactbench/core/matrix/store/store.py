@@ -33,13 +33,7 @@ _FULL = {
 
 
 class Store:
-    """A result folder. Making one reads and writes nothing; :meth:`hold` makes the folder.
-
-    Parameters
-    ----------
-    folder
-        Path of the folder, which need not exist.
-    """
+    """A result folder at the path `folder`, which need not exist: :meth:`hold` makes it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

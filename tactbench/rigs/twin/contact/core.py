@@ -37,6 +37,6 @@ class CoreReaction:
 
 
 def with_core(medium: Medium, skin: FluidBackedShell) -> Medium:
-    """Return `medium` with a core that answers once less than the residual film is left."""
+    """Return `medium` with a core that carries load where less than the residual film is left."""
     film = medium.rest_thickness_mm - medium.least_thickness_mm
     return replace(medium, respond=CoreReaction(medium.respond, skin.core_stiffness.to("MPa/mm"), film))

@@ -35,11 +35,11 @@ _LARGEST_GAP = 1.3
 """A gap between nodes is split when it is wider than this many intervals."""
 _UNSEEN = 3.0
 """Safety of the reported bound: where readings bend sharply, just above touch-down, the error between two nodes has
-been up to 2.4 times what the nodes miss one another by."""
+been up to 2.4 times the largest such difference at a node."""
 _NARROWEST_N = 0.02
 """No interval narrower than this is split."""
 _TOUCH_DOWN_N = 0.01
-"""How closely the load is bracketed at which the film closes."""
+"""Width of the bracket of the load at which the film closes."""
 
 
 class SkinCurves(NamedTuple):
@@ -63,7 +63,7 @@ class LoadTable:
     touch_down_n: tuple[float, float] | None
     """Bracket of the load at which the skin touches the core; None if it never does."""
     error: FloatArray
-    """(channels,) three times the most by which a solved reading differs from the interpolant through the others."""
+    """(channels,) three times the largest difference of a solved reading from the interpolant through the others."""
     interpolant: Interpolant
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
@@ -89,7 +89,7 @@ class LoadTable:
         return self.interpolant.steepest(float(low), float(high))
 
     def per_mm(self, of: Callable[[FloatArray], FloatArray], force_n: FloatArray) -> FloatArray:
-        """Return how (m, k) numbers `of` a force grow with depth at (n,) forces: (n, k), chords of a fiftieth."""
+        """Return the (n, k) slopes against depth, at (n,) forces, of a function `of` force: chords of a fiftieth."""
         nodes = np.linspace(0.0, float(self.loads_n[-1]), 51)
         deeper = np.diff(self.skin(nodes).depth_mm)
         risen = np.diff(of(nodes), axis=0)
@@ -254,7 +254,7 @@ def _split_gaps(builder: _Builder, start: float, end: float, intervals: int, pow
 def _refine(
     builder: _Builder, touch_down: tuple[float, float] | None, tolerance: FloatArray, most_nodes: int
 ) -> FloatArray:
-    """Split beside the node that the others predict worst, until all are predicted; return the bound achieved."""
+    """Add nodes beside the worst predicted one until all are predicted well; return the bound achieved."""
     while True:
         loads = sorted(builder.nodes)
         fixed = {loads[0], loads[-1], *(touch_down or ())}

@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
-"""Above it springs are wrong: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
+"""Limit of the model: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
 to 19 %, least where the contact is wide beside the layer's thickness."""
 _CLOSED = 1e-12
 _STEPS = 60

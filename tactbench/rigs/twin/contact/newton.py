@@ -48,7 +48,7 @@ class Solution:
     pressure_mpa: FloatArray
     """(nx, ns) contact pressure."""
     residual: float
-    """Of the field equation, relative to the load; the force balance holds to rounding."""
+    """Residual of the field equation relative to the load; the force balance holds to rounding."""
 
     @property
     def depth_mm(self) -> float:
@@ -57,7 +57,7 @@ class Solution:
 
 
 class NewtonSolver:
-    """Presses one medium through one gap.
+    """Solver of the contact of one medium through one gap.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class NewtonSolver:
         return (abs(float(gradient[-1])) + math.sqrt(float(field @ field))) / load
 
     def _rounding(self, vector: FloatArray, load: float) -> float:
-        """Return what rounding alone makes of the residual at the state last evaluated, relative to the load.
+        """Return the part of the residual that is rounding at the state last evaluated, relative to the load.
 
         The terms are the skin's own stiffness times its deflection, the contact's pressure, and what that pressure is
         the difference of: the contact's stiffness times the approach, and times gap and deflection, which are as large.
@@ -273,7 +273,7 @@ class NewtonSolver:
         return step
 
     def _solution(self, force_n: float, vector: FloatArray, residual: float) -> Solution:
-        """Return the converged state, its approach moved by what the force balance still lacks.
+        """Return the converged state, with an approach that balances the force exactly.
 
         The residual summed both equations, so the field's stays below it.
         """

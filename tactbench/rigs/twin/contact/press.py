@@ -33,7 +33,7 @@ class AnyPress(Protocol):
 
 
 def at_rest(medium: Medium) -> SkinState:
-    """Return the skin with nothing touching."""
+    """Return the state of the skin without contact."""
     zero = np.zeros(medium.spectrum.shape)
     return SkinState(
         grid=medium.grid,
@@ -65,7 +65,7 @@ def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray
 
 
 class Press:
-    """Solves forces in any order.
+    """Solver of one contact for forces in any order.
 
     Parameters
     ----------

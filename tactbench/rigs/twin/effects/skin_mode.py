@@ -1,4 +1,4 @@
-"""The skin's tangential mode: how it swings back in a slip, and how a motion shakes it.
+"""The tangential mode of the skin: its motion in a slip, and its response to a given motion.
 
 In a slip the skin under the contact is a damped oscillator ``x'' + 2 z w x' + w^2 (x - x_e) = 0`` about ``x_e``, the
 deflection that kinetic friction holds. It lets go at ``x_e + u`` with the surface's speed V and is caught when it has

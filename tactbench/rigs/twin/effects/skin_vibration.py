@@ -16,9 +16,9 @@ LIFT: Quantity = assumed(
 )
 """Normal over tangential motion of the skin, for sensors whose parameters state no ``skin_lift``."""
 COMPONENTS = 48
-"""Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""
+"""Number of cosines of the profile: enough to be close to Gaussian; it determines the effect's cost."""
 LONGEST_MM, SHORTEST_MM = 100.0, 0.02
-"""Of their wavelengths. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
+"""Wavelengths of the cosines. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
 _RADII = 1025
 """Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
