@@ -77,16 +77,7 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
 
 
 def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:
-    """List the cells of `matrix`, in the order in which they are run and stored.
-
-    Parameters
-    ----------
-    matrix
-        What to run.
-    sensors
-        The sensors to run it on, already checked.
-    registry
-        Where tasks and estimators are looked up.
+    """List the cells of `matrix` on known `sensors`, in the order in which they are run and stored.
 
     Raises
     ------

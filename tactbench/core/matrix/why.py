@@ -97,17 +97,12 @@ def stored_cell(store: Store, given: str) -> StoredCell:
 
 
 def meant(given: str, names: Sequence[str]) -> str:
-    """Return the name of the cell that `given` stands for: its name, a part of only one name, or some of its parts.
+    """Return the one of `names` that `given` stands for: the name, a part of only one name, or some of its parts.
 
     ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
 
     The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
     part, stands for the first of them.
-
-    Parameters
-    ----------
-    names
-        Names of the existing cells.
 
     Raises
     ------

@@ -47,14 +47,7 @@ def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
 
 
 def remarks(press: AnyPress, loads_n: Iterable[float], sheet: SkinSheet) -> dict[str, Scalar]:
-    """Return remarks on the validity of a contact at the largest of `loads_n`.
-
-    Parameters
-    ----------
-    press
-        The contact; `loads_n` have been solved with it.
-    sheet
-        Sheet of the pressed skin.
+    """Return remarks on the validity of a contact on `sheet` at the largest of `loads_n`, which `press` has solved.
 
     Returns
     -------

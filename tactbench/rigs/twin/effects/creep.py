@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import ChannelKind, FloatArray
-from tactbench.plugin.simulation import Creep, Nuisances
+from tactbench.plugin.simulation import Nuisances
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, read_names, skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
@@ -25,18 +25,12 @@ def apply(run: Synthesis) -> None:
     for track in run.tracks:
         for kind in track.by_kind():
             if kind in late:
-                effective = followed(track.t_s, track.force_n, late[kind].creep)
+                fractions = [term.fraction.to("1") for term in late[kind].creep]
+                effective: FloatArray = (1.0 - sum(fractions)) * track.force_n
+                for fraction, term in zip(fractions, late[kind].creep, strict=True):
+                    effective = effective + fraction * lag(track.t_s, track.force_n, term.tau.to("s"))
                 # A weighted mean of forces that were: rounding must not leave the table's range.
                 track.effective_n[kind] = np.clip(effective, track.force_n.min(), track.force_n.max())
-
-
-def followed(t_s: FloatArray, force_n: FloatArray, terms: tuple[Creep, ...]) -> FloatArray:
-    """Return the (n,) effective force of a response with the creep `terms`."""
-    fractions = [term.fraction.to("1") for term in terms]
-    effective: FloatArray = (1.0 - sum(fractions)) * force_n
-    for fraction, term in zip(fractions, terms, strict=True):
-        effective = effective + fraction * lag(t_s, force_n, term.tau.to("s"))
-    return effective
 
 
 def steepest_n_per_s(load: Load) -> float:
@@ -69,17 +63,12 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
             if kind in READ_FROM_THE_SKIN:
                 steepest = table.steepest(float(track.force_n.min()), float(track.force_n.max()))
                 slope = _steepest(track, own, names, steepest)
-            slope *= _stretch(run) if kind == "taxel" else 1.0
+            if kind == "taxel" and run.scene.environment.indenter_temperature is not None:
+                from tactbench.rigs.twin.effects.heat import largest_stretch
+
+                slope *= largest_stretch(run)
             found[kind] = max(found.get(kind, (0.0, 0.0)), (slope * late_s * rate, slope))
     return found
-
-
-def _stretch(run: Synthesis) -> float:
-    if run.scene.environment.indenter_temperature is None:
-        return 1.0
-    from tactbench.rigs.twin.effects.heat import largest_stretch
-
-    return largest_stretch(run)
 
 
 def _steepest(track: Track, own: list[int], names: list[str], slopes: FloatArray) -> float:

@@ -41,7 +41,7 @@ def apply(run: Synthesis) -> None:
     noise = run.scene.environment.force_noise.to("N") * errors.standard_normal(steps)
     table = bare_skin(run, BEYOND * run.load.largest_n)
     force_n, deepest = force_at_depth(table)
-    start = depth_of(table, float(setpoint[0]))
+    start = float(table.skin(setpoint[:1]).depth_mm[0])
     model = LoopModel.of(drive, "mm", period_s=step_s, travel=(-RETRACT_MM, deepest))
     depths = model.simulate(force_n, setpoint, noise, start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
@@ -77,9 +77,3 @@ def force_at_depth(table: LoadTable) -> tuple[Callable[[float], float], float]:
         return forces[before] + (place - before) * (forces[before + 1] - forces[before])
 
     return force_n, deepest
-
-
-def depth_of(table: LoadTable, force_n: float) -> float:
-    """Return the depth at which the skin answers with a force, mm."""
-    depth: FloatArray = table.skin(np.array([force_n])).depth_mm
-    return float(depth[0])

@@ -18,7 +18,7 @@ LIFT: Quantity = assumed(
 COMPONENTS = 48
 """Number of cosines of the profile: enough to be close to Gaussian; it determines the effect's cost."""
 LONGEST_MM, SHORTEST_MM = 100.0, 0.02
-"""Wavelengths of the cosines. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
+"""Wavelengths of the cosines. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band."""
 _RADII = 1025
 """Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
