@@ -96,9 +96,9 @@ def main() -> None:
         # What stands on it is left out as well, so that the effect's own cost is what differs.
         left_out = [f"-{name}"] + (["-skin-vibration"] if name == "friction" else [])
         before = whole.model_copy(update={"simulation": Simulation(effects=tuple(left_out))})
-        after = whole.model_copy(update={"simulation": Simulation(effects=(*left_out, f"+{name}"))})
-        rows = {row.entry.effect: row for row in plain.explain(sensor, after, rounds=rounds)}
+        rows = {row.entry.effect: row for row in plain.explain(sensor, before, rounds=rounds)}
         said = rows[name].cost_s
+        after = whole.model_copy(update={"simulation": Simulation(effects=(*left_out, f"+{name}"))})
         without, with_it = turn_about(rounds, (plain, sensor, before, False), (plain, sensor, after, False))
         cost = statistics.median(b - a for a, b in zip(without, with_it, strict=True))
         print(f"  {name:<16}{1e3 * (said or 0):8.2f}{1e3 * cost:8.2f}{cost / said if said else float('nan'):8.2f}")

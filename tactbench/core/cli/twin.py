@@ -33,7 +33,7 @@ def command() -> None:
 @EFFECTS
 @format_option("table", "json", "csv")
 def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, shape: str) -> None:
-    """Show which effects a task's scenes get, which they do not, and why; with what each effect costs.
+    """Show which effects a task's scenes get, which they do not, why, and what each costs or would cost.
 
     It ends with the task's score with the effects chosen beside that with all of them.
     """

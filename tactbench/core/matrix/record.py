@@ -8,7 +8,7 @@ from typing import Any
 
 from tactbench.core.plugins.interfaces import Operator, RecordingRequest
 from tactbench.core.plugins.registry import Family, Registry
-from tactbench.core.plugins.rigs import rig_of
+from tactbench.core.plugins.rigs import rig_of, taking_part
 
 GRACE_S = 5.0
 """Seconds for a real rig to stop and close its devices after a timeout."""
@@ -30,6 +30,14 @@ class Recorder:
             self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
         # The cost of a simulation is processor time, since several run at once; that of a real rig is wall time.
         acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
+
+
+def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
+    """Return the names of effects and of an indenter of other packages that making a recording may import."""
+    effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
+    shape = str(request.scene.indenter.shape)
+    foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
+    return (*(one.descriptor.name for one in effects if not one.ours), *foreign)
 
 
 def is_computed(request: RecordingRequest) -> bool:

@@ -22,7 +22,7 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
+from tactbench.core.matrix.record import GRACE_S, Recorder, foreign_components, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import declared_in, with_declared
@@ -147,7 +147,7 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress)
+        run = Run(store, registry, keys, plan, choice, operator, progress, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -165,6 +165,7 @@ class Run:
     choice: EngineChoice
     operator: Operator | None
     progress: Progress
+    cells: Sequence[Cell]
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
     recorded: int = 0
@@ -224,12 +225,14 @@ class Run:
         return request.path.exists()
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
-        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
+        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed, sensor and packages."""
         pieces: dict[tuple[object, ...], list[RecordingRequest]] = {}
         for request in missing:
-            pieces.setdefault((request.seed, request.sensor.name) if computed else (), []).append(request)
+            apart = (foreign_components(self.registry, request), request.seed, request.sensor.name) if computed else ()
+            pieces.setdefault(apart, []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
-        for piece in pieces.values():
+        # Where all are made in one process, those that import no other package are made before one is imported.
+        for _, piece in sorted(pieces.items(), key=lambda one: any(one[0][:1])):
             for part in range(min(parts, len(piece))):
                 requests = piece[part::parts]
                 recorder.submit(Recorder(self.registry, self.operator), requests)

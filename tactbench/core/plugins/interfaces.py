@@ -124,7 +124,8 @@ class Explained(NamedTuple):
 
     entry: PlanEntry
     cost_s: float | None
-    """Seconds that it takes per recording on this machine; None: left out, not measured, or part of another effect."""
+    """Seconds it takes, or would take if it was asked for, per recording on this machine; None: not measured, or not
+    to be told apart from another one's."""
     remark: str = ""
     """Why there is no cost, where that is worth a word."""
 

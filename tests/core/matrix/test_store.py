@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
-from tactbench.core.matrix.store.cell_file import read_cell
+from tactbench.core.matrix.store import store as STORE
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 
@@ -79,6 +80,16 @@ def test_the_latest_of_a_name_counts(tmp_path):
     assert (len(found.answers(key(1))["test"]), found.finished(key(1))["cell"]) == (3, "a")
 
 
+def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
+    """Of folders written before replicates were named by their seeds, those that never had a key among them."""
+    (tmp_path / "cells").mkdir()
+    for old in (row("a/1", repeat=1, seed=3), row("b/1", "failed", repeat=1, seed=3)):
+        file_of(tmp_path, old["cell"]).write_bytes(CellFile(old, SECTIONS).content())
+    found = Store(tmp_path)
+    assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
+    assert all(found.cell(one).row == one for one in found.rows())
+
+
 def test_an_answer_from_other_recordings_supersedes_the_older_one_and_that_is_known(tmp_path):
     with Store(tmp_path).hold() as store:
         first = kept(store, "a", key=key(1), digests=["x"])
@@ -99,7 +110,7 @@ def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
     file.write_bytes(file.read_bytes()[:-1])
     found = Store(tmp_path)
     assert [one["cell"] for one in found.rows()] == ["b"]
-    assert found.finished(key("a")) is None
+    assert (found.finished(key("a")), found.answers(key("a"))) == (None, {})
     assert file.name in " ".join(found.troubles)
     with Store(tmp_path).hold() as again:
         kept(again, "a", score=2.0)
@@ -222,3 +233,11 @@ def test_the_queries_of_the_page_run(tmp_path):
     assert stopped == [("b/1", "failed", "a test says so")]
     assert {line[0] for line in everything} == {"a/10", "a/2", "b/1"}
     assert {json.loads(line[-1])["cell"] for line in everything} == {"a/10", "a/2", "b/1"}
+
+
+def test_a_cell_that_is_read_back_otherwise_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(STORE, "replace_file", lambda path, content: path.write_bytes(content[:-1]))
+    with Store(tmp_path).hold() as store:
+        with pytest.raises(FolderError, match="read back"):
+            kept(store, "a")
+        assert (store.finished(key("a")), store.rows(), list(tmp_path.glob("cells/*"))) == (None, [], [])

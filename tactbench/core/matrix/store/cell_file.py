@@ -34,6 +34,12 @@ class CellFile:
     """Answers by role; empty for a cell that did not finish."""
 
     @property
+    def text(self) -> str:
+        """All but the answers, as JSON."""
+        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
+        return json.dumps(head, allow_nan=False)
+
+    @property
     def digests(self) -> dict[str, str]:
         """Digests of the answers by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
@@ -42,11 +48,10 @@ class CellFile:
         """Return the bytes of the file."""
         import numpy as np
 
-        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
-        text = json.dumps(head, allow_nan=False)
+        text = self.text.encode()
 
         def fill(file: Any) -> None:
-            file["head"] = np.bytes_(text.encode())
+            file["head"] = np.bytes_(text)
             for role, answers in self.answers.items():
                 file.create_dataset(f"answers/{role}", data=_table(answers), shuffle=True, compression=4)
 
@@ -74,6 +79,10 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
         raise FormatError(f"{path} {what}.", hint="Run the cell again.")
     with h5py.File(io.BytesIO(content), "r") as file:
         head = json.loads(file["head"][()])
+        row = head["row"]
+        if number := row.pop("repeat", None):  # until replicates were named by their seeds
+            name = f"{row['cell'].removesuffix(str(number))}{row['seed']}"
+            row |= {"cell": name, "key": row["key"] or path.stem}
         tables = {role: table[()] for role, table in file.get("answers", {}).items()} if answers else {}
     columns = {role: {name: table[name].copy() for name in _COLUMNS} for role, table in tables.items()}
     return CellFile(**head, answers={role: Answers(**values) for role, values in columns.items()})

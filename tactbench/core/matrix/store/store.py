@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import FolderError
+from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.files import named_file, replace_file, try_lock, utf8_json
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
@@ -110,6 +110,7 @@ class Store:
         content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
+            _check_written(path, cell)
             before = self._files.files_of(cell.row["cell"])
             old = self._files.finished(before[0][1]) if before else None
             if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
@@ -138,9 +139,14 @@ class Store:
         return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
-        """Return the answers of a finished cell by role, nothing if there is no such cell; raises as `cell`."""
+        """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""
         path = self.folder / "cells" / f"{key}.h5"
-        return dict(read_cell(path).answers) if path.is_file() else {}
+        try:
+            return dict(read_cell(path).answers) if path.is_file() else {}
+        except FormatError as error:
+            if str(error) not in self._files.troubles:
+                self._files.troubles.append(str(error))
+            return {}
 
     def provenance(self, name: str) -> dict[str, Any]:
         """Return which software computed a cell where, by the id in ``row["made_by"]``; empty if not known."""
@@ -171,6 +177,18 @@ def _read_recording(path: Path) -> dict[str, Any]:
         meta = recording.meta
         scene = meta.scene.name if meta.scene else None
         return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
+
+
+def _check_written(path: Path, cell: CellFile) -> None:
+    """Read the file of a cell back; FolderError, and no file, if it holds anything else."""
+    try:
+        found = read_cell(path)
+        same = (found.text, found.digests) == (cell.text, cell.digests)
+    except FormatError:
+        same = False
+    if not same:
+        path.unlink(missing_ok=True)
+        raise FolderError(f"What is read back of {path} is not what was written.", hint="Did the disk fail?")
 
 
 @contextmanager
