@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +27,23 @@ _canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), default=rep
 
 @dataclass
 class Keys:
-    """The keys of one run: what does not change from cell to cell is worked out once."""
+    """The keys of one run."""
 
     registry: Registry
-    _answers: dict[tuple[str, str], Sections] = field(default_factory=dict)
-    _makers: dict[tuple[str, ...], Sections] = field(default_factory=dict)
 
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
-        sections = {**self._answering(cell), "configuration": configuration_of(cell)}
-        key = digest_of(_canonical({**sections, "data": list(data.values())}))
-        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
+        task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
+        features_by = self.registry.tasks[cell.task].spec.features_by
+        modules = [task.module, estimator.module, estimator.descriptor.where, features_by]
+        sections = {
+            "task": task.declared or cell.task,
+            "estimator": cell.estimator,
+            "versions": versions(estimator.descriptor.distributions),
+            "source": sources_of(filter(None, modules), ANSWERING),
+            "configuration": configuration_of(cell),
+        }
+        return _keyed(sections, data)
 
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
@@ -59,23 +65,7 @@ class Keys:
             "source": sources_of(modules, ANSWERING),
             "configuration": configuration_of(cell),
         }
-        key = digest_of(_canonical({**sections, "data": list(data.values())}))
-        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
-
-    def _answering(self, cell: Cell) -> Sections:
-        pair = cell.task, cell.estimator
-        if pair not in self._answers:
-            task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
-            features_by = self.registry.tasks[cell.task].spec.features_by
-            modules = [task.module, estimator.module, estimator.descriptor.where]
-            modules += [features_by] if features_by else []
-            self._answers[pair] = {
-                "task": task.declared or cell.task,
-                "estimator": cell.estimator,
-                "versions": versions(estimator.descriptor.distributions),
-                "source": sources_of(modules, ANSWERING),
-            }
-        return self._answers[pair]
+        return _keyed(sections, data)
 
     def of_recording(
         self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: RigFile | None = None
@@ -92,31 +82,32 @@ class Keys:
         Recordings of real devices stay valid when the code of their drivers changes: their key covers sensor, rig and
         rig file alone.
         """
-        effects = taking_part(self.registry, self.registry.sensors[sensor], scene)
-        shape = scene.indenter.shape
         stated = "" if rig_file is None else rig_file.model_dump_json()
-        made = (sensor, rig, stated, str(shape), *(effect.descriptor.name for effect in effects))
-        if made not in self._makers:
-            sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
-            if rig_file is None or rig_file.emulated:
-                owner, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
-                modules = [owner.module, carrier.module, carrier.descriptor.where]
-                modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
-                modules += [] if rig_file is None else self._behind(rig_file)
-                for effect in effects:
-                    modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-                if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig complains
-                    indenter = self.registry.indenters.owned(shape)
-                    modules += [indenter.module, indenter.descriptor.where]
-                sections |= {"versions": versions(), "source": sources_of(modules, RECORDING)}
-            self._makers[made] = sections
-        return self._makers[made]
+        sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
+        if rig_file is not None and not rig_file.emulated:
+            return sections
+        owner, carrier, shape = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig), scene.indenter.shape
+        modules = [owner.module, carrier.module, carrier.descriptor.where]
+        modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
+        modules += [] if rig_file is None else self._behind(rig_file)
+        for effect in taking_part(self.registry, owner.descriptor, scene):
+            modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
+        if shape is not None and shape in self.registry.indenters:  # the rig refuses an unknown one
+            indenter = self.registry.indenters.owned(shape)
+            modules += [indenter.module, indenter.descriptor.where]
+        return sections | {"versions": versions(), "source": sources_of(modules, RECORDING)}
 
     def _behind(self, devices: RigFile) -> list[str]:
         """Return the modules of a rig file's devices, and of the simulation behind the emulated ones."""
         names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
         physics = self.registry.rigs.owned(devices.emulation.physics)
         return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
+
+
+def _keyed(sections: Sections, data: Mapping[Path, str]) -> tuple[str, Sections]:
+    """Return the key of a result and its sections; the names of recordings are shown but do not count."""
+    key = digest_of(_canonical({**sections, "data": list(data.values())}))
+    return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 
 
 def configuration_of(cell: Cell) -> Sections:

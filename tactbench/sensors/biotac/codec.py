@@ -1,8 +1,8 @@
-"""The BioTac's protocol on SPI: conversion of commands, replies and properties to bytes and back.
+"""The BioTac's words on SPI: commands, replies and properties to bytes and back.
 
-The functions do no input or output. Two public sources state the protocol and agree unless noted otherwise: [driver]
+Nothing here reads, writes or waits. Two public sources state the protocol and agree where not said otherwise: [driver]
 kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
-the SynTouch BioTac SP product manual of 26 Oct 2015, which states that the BioTac uses the same protocol. Tested
+the SynTouch BioTac SP product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Tested
 against an emulator written from the same sources; it has never met a real sensor.
 
 SPI mode 0, most significant bit first, select active low, 500 kHz to 10 MHz [sourced: both]. The host sends a command
@@ -35,13 +35,17 @@ INDEX: dict[str, int] = {
 """Number of each channel in a sampling command [sourced: driver; Hall on some models, E20 to E24 on the SP: manual]."""
 
 NAMES: dict[int, str] = {index: name for name, index in INDEX.items()}
-"""Name of the channel for each number."""
+"""The same turned round."""
 
 STREAMING_INDEX = 16
-"""Command that starts the streaming of protocol 1.1, which ends after 5 s without a clock [sourced]; it is not used."""
+"""Switches a sensor to the streaming of protocol 1.1, left only after 5 s without a clock [sourced]: never sent."""
 
 CHANNELS: tuple[str, ...] = tuple(channel.name for stream in STREAMS for channel in stream.channels)
 """The channels of the model with 19 electrodes, in the order of the spec's streams."""
+
+RESEND = b"\x20\x00"
+"""Asks for the last two bytes once more. The driver has 20; the manual prints 50, of even parity, against its own
+rule, so 20 is sent [derived]."""
 
 READ, WRITE = 0x61, 0x40
 """First byte of a command that reads or writes a property [sourced: both; writing: manual]."""
@@ -73,16 +77,18 @@ PROPERTIES: dict[str, Property] = {
     "flex version": Property(0x10, 2),
     "software version": Property(0x13, 4),
     "serial number": Property(0x15, 16),
+    "cpu speed": Property(0x61, 2),
+    "sampling frequency": Property(0x70, 2),
 }
 """All are read-only and sent without parity [sourced: manual, table 10; driver]."""
 
 
 class Fault(StrEnum):
-    """Fault of one reply."""
+    """What can be wrong with one reply."""
 
     PARITY = "parity"
     RESERVED = "reserved bits"
-    """Parity holds, but a reserved bit is not 0."""
+    """Parity holds, but a bit that is always 0 is not."""
     ERROR = "error reply"
     NOT_CONNECTED = "not connected"
     """The line was held low or high throughout: 00 00 or FF FF, both of bad parity."""
@@ -91,7 +97,7 @@ class Fault(StrEnum):
 
 
 class Reply(NamedTuple):
-    """One decoded word from the sensor."""
+    """One word from the sensor."""
 
     value: int | None
     """0 to 4095 as received, wrong by a bit under PARITY and RESERVED; None where no datum came."""
@@ -140,7 +146,7 @@ def encoded(count: int) -> bytes:
 
 
 def decoded(word: bytes) -> Reply:
-    """Return the decoded reply; no bytes raise an error.
+    """Return what a reply says; any bytes are read, none raises.
 
     A datum whose first byte became A5 on the line looks like an error reply if 58 follows, and like bad parity
     otherwise: flagged either way.
@@ -159,7 +165,7 @@ def decoded(word: bytes) -> Reply:
 
 
 def property_text(name: str, raw: bytes) -> str | None:
-    """Return a property as the maker's tools show it; None if `raw` is not valid, as without a sensor.
+    """Return a property as the maker's tools show it; None if `raw` is none, as from a sensor that is not there.
 
     Parameters
     ----------

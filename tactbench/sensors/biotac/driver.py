@@ -1,4 +1,4 @@
-"""Driver of the BioTac, which samples it by batches of SPI transfers.
+"""Driver of the BioTac: batches of SPI transfers in, blocks of counts out.
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
 every byte, so something must keep the time of 4400 words a second. That is an SPI bridge (``spi://bridge/…``, a
@@ -8,7 +8,8 @@ microcontroller that carries out batches by itself, ``docs/links.md``) or, less 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
 4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`); an adapter adds
 what it needs itself. Some batches are under way ahead of the one that runs, so that the host may be late by as many
-frames. Each word is requested once: the steps of a batch are fixed before its first reply arrives.
+frames. Words are asked for once: what a batch does cannot depend on what it reads (the option `resends` asks for each
+word again, always).
 
 **Times.** A bridge stamps each batch with its own microseconds: `device_ns` of a row is that stamp, counted on over its
 wraps, and the word's place in the batch; `t_ns` is when the reply was in the host, the same for all rows of a batch.
@@ -33,9 +34,9 @@ cable, port or bridge gone             the reading ends with LinkUnplugged
 
 A gap is never filled. Rows are raw counts.
 
-**Tested** against an emulator written from the same public sources, behind an emulated bridge; not with a real BioTac,
-bridge or spidev. The main assumptions are that the sensor samples at the last bit of its command and
-that a property is read with the pause of a sampling command.
+**Tested** against an emulator written from the same public sources, behind an emulated bridge. It has never met a real
+BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command, that
+a property is read with the pause of a sampling command, and that a resend needs the same pause.
 """
 
 from __future__ import annotations
@@ -74,11 +75,11 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import Link
 
 PATIENCE_S = 0.5
-"""Time after the end of a batch at which its reply counts as lost [assumed: USB and a busy host take less]."""
+"""Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""
 
 
 class BioTacDriver(Driver):
-    """Driver of one BioTac.
+    """One BioTac.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ class BioTacDriver(Driver):
     UsageError
         For options that are not known.
     RigError
-        If the link is no SPI link, or its clock is not one for a BioTac.
+        If the link is no SPI link, or its clock is not one for a BioTac, or leaves no time for so many resends.
     LinkError
         If the link cannot be opened.
     """
@@ -110,19 +111,20 @@ class BioTacDriver(Driver):
             raise
 
     def _set_up(self) -> None:
-        """Reset the state to position 0, with no batch under way."""
+        """Begin at position 0 with nothing under way."""
         options = self._options
         try:
             self._batches = FrameBatches(
                 options.frame,
                 speed_hz=self._link.speed_hz,
                 select=options.select,
+                resends=options.resends,
                 words=options.batch_words,
             )
         except ValueError as error:
             raise RigError(
                 f"{self._link.address} is too slow for a BioTac: {error}.",
-                hint="Choose a faster clock.",
+                hint=f"Choose a faster clock, or fewer resends than {options.resends}.",
             ) from error
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
@@ -131,19 +133,21 @@ class BioTacDriver(Driver):
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The spec's streams, with the channels and rates of the frame."""
+        """The spec's streams, or those channels of theirs that the frame has, at its rates."""
         rate_hz = COMMAND_RATE.to("Hz")
         source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self._options.frame)}")
         return streams_of(self._options.frame, rate_hz, source)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of faults by name and channel, such as ``parity E7``.
+        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when asked for again.
 
-        They include ``batches lost`` (no reply came), ``batches late`` (begun more than the time of a word after the
-        end of the previous batch) and ``frames not asked for`` (frames whose time passed in such a pause).
+        Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
+        the batch before) and ``frames not asked for`` (that would have had their time in between).
         """
-        return dict(self._counts + Counter(counted(self._batches.faults)))
+        now = Counter(counted(self._batches.faults))
+        now.update({f"resent {name}": n for name, n in self._batches.resent.items()})
+        return dict(self._counts + now)
 
     def identify(self) -> Mapping[str, str]:
         """Return serial number, flex version and software version as the maker's tools show them.
@@ -156,7 +160,7 @@ class BioTacDriver(Driver):
             If the adapter does not answer.
         """
         if self._running:
-            raise RigError("A BioTac cannot be identified while it samples.", hint="Stop it before.")
+            raise RigError("A BioTac that samples was asked who it is.", hint="Ask before start, or after stop.")
         self._property("software version")  # thrown away, as the maker's library does
         found = {}
         for name in ("serial number", "flex version", "software version"):
@@ -183,7 +187,7 @@ class BioTacDriver(Driver):
                 return reply.data[1]
 
     def start(self) -> None:
-        """Send the first batches; sequence numbers begin at 0, the adapter's counter continues."""
+        """Send the first batches; sequence numbers begin at 0, times by the adapter's counter where that stands."""
         if not self._running:
             self._counts = Counter(self.counts)
             self._set_up()
@@ -196,7 +200,7 @@ class BioTacDriver(Driver):
             self._sent.append((self._link.send(steps), first))
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the completed frames, see :class:`Driver`; nothing while the driver is stopped.
+        """Return the frames that are over; see :class:`Driver`. Nothing while it is stopped.
 
         An adapter without a program of its own carries out a batch in here: then it takes a batch's time at least.
         """
@@ -214,7 +218,7 @@ class BioTacDriver(Driver):
         return self._batches.blocks()
 
     def _give_up_lost(self) -> None:
-        """Drop all batches under way if no reply has come for longer than they can take."""
+        """Drop what is under way if nothing has come for longer than all of it can take."""
         due_ns = self._ahead * self._batches.timing(0).end_ns + round(PATIENCE_S * 1e9)
         if self._clock() - self._received_ns > due_ns:
             self._link.abandon()
@@ -233,7 +237,7 @@ class BioTacDriver(Driver):
         self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
 
     def _answered(self, reply: SpiReply) -> int | None:
-        """Return the first position of the batch that `reply` belongs to, or None; batches before it are lost."""
+        """Return the first position of the batch that `reply` is to; those before it are lost. None: to none."""
         if reply.number not in (number for number, _ in self._sent):
             return None
         while True:
@@ -243,7 +247,7 @@ class BioTacDriver(Driver):
             self._counts["batches lost"] += 1
 
     def _begun_us(self, counter_us: int, first: int) -> int:
-        """Return the adapter's unwrapped counter at the start of a batch; count frames skipped before it."""
+        """Return when a batch began by the adapter's counter, counted on; note what was not asked for before it."""
         if self._last is None:
             begun_us = counter_us
         else:
@@ -260,7 +264,7 @@ class BioTacDriver(Driver):
         return begun_us
 
     def stop(self) -> None:
-        """Wait for the replies to batches under way and drop them."""
+        """Wait for what is under way and drop it."""
         if not self._running:
             return
         self._running = False

@@ -1,7 +1,7 @@
-"""Frames of the BioTac: commands with their pauses, and conversion of replies to samples of the spec's two streams.
+"""Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
 
-The classes do no input or output: a driver takes the next batch, sends it, and hands the reply back. Missing samples
-are marked, not interpolated.
+No input or output, no clock of its own: whoever drives the bus asks for the next batch, sends it, and hands back what
+was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from tactbench.sensors.biotac.codec import (
     CHANNELS,
     COMMAND_RATE,
     INDEX,
+    RESEND,
     SAMPLING_PAUSE,
     WORD_PAUSE,
     Fault,
@@ -38,11 +39,11 @@ DEFAULT_FRAME: tuple[str, ...] = tuple(
 """44 commands, every second one PAC [sourced: kth-ros-pkg/biotac_driver, BT_FRAME_STRUCTURE_DEFAULT]."""
 
 FILLER = b"\x00\x00"
-"""Bytes sent while a word is read [sourced: driver]."""
+"""Sent while a word is read [sourced: driver]."""
 
 
 def quality_of(reply: Reply) -> Quality:
-    """Return the quality flag of a reply as a sample.
+    """Return what is wrong with a reply as a sample.
 
     A word of bad parity keeps the number that came and is SUSPECT: at least one of its bits is wrong. Without a datum a
     sample is MISSING; at either end of the converter it is SATURATED.
@@ -60,16 +61,16 @@ def counted(faults: Mapping[str, Counter[Fault]]) -> dict[str, int]:
 
 
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
-    """Return the spec's streams with the channels and rates of a frame.
+    """Return the spec's streams as a frame fills them: with its channels only, at its rates.
 
     Parameters
     ----------
     frame
         Names of channels in the order of their commands.
     rate_hz
-        Commands a second; None: unknown.
+        Commands a second; None: nobody states it.
     source
-        Source of the rates, if they differ from the spec.
+        Where the rates are from, if they are not the spec's.
     """
     found = []
     for stream in STREAMS:
@@ -109,7 +110,7 @@ class FrameRows:
     Raises
     ------
     ValueError
-        If a name is not a channel of the sensor, or there are no names.
+        If a name is none of the sensor's channels, or there is none.
     """
 
     def __init__(self, frame: tuple[str, ...]) -> None:
@@ -144,9 +145,9 @@ class FrameRows:
         position
             Number of its command since the first of all, frame after frame.
         count
-            The datum; ignored if MISSING.
+            The datum; of no meaning if MISSING.
         quality
-            Its quality flag.
+            What is wrong with it.
         t_ns, device_ns
             Its times, nanoseconds of the host's clock and of the adapter's, if they are known. A row has the times of
             its first word.
@@ -179,7 +180,7 @@ class FrameRows:
             self._open[k] = None
 
     def close(self) -> None:
-        """Complete all begun rows."""
+        """End every row that is begun."""
         for k in range(len(self._streams)):
             self._close(k)
 
@@ -211,10 +212,10 @@ def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
 
 
 class Timing(NamedTuple):
-    """Times of the words and of the end of a batch, nanoseconds from its beginning."""
+    """When the words of a batch are sampled and when the batch is over, nanoseconds from its beginning."""
 
     sampled_ns: tuple[int, ...]
-    """Times at which the words are sampled: at the last bits of their commands [assumed]."""
+    """A word is sampled at the last bit of its command [assumed]."""
     end_ns: int
 
 
@@ -224,9 +225,14 @@ class FrameBatches:
     A word is a sampling command, the pause, two bytes read, and a pause that fills its time. SPI adapters take whole
     microseconds, so the pauses differ by one: the time of n words is n / 4400 s to 1 us, whatever the SPI clock.
 
-    Words of bad parity are marked SUSPECT and counted; the sensor's resend command is not used, because the steps of a
-    batch are fixed before its first reply arrives. The sensor sends no counter: the sequence number of a row is the
-    host's count of commands. A reply that repeats the previous word cannot be recognised by its bytes.
+    A resend repeats the last two bytes, so it must come before the next command; and what a batch does cannot depend on
+    what it reads. So a resend is no repair on demand: with `resends` above 0 *every* word is asked for so many times
+    more, and the first that came good is taken. By default there is none: a word of bad parity is SUSPECT and counted.
+    It would double the bytes and the batch's size for words that are hardly ever bad, and no source states which pause
+    a resend needs; 50 us as after a sampling command is assumed, and there is time for one at 4400 words a second.
+
+    The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
+    repeats the word before it cannot be told by its bytes.
 
     Parameters
     ----------
@@ -236,18 +242,23 @@ class FrameBatches:
         Clock of the SPI bus, hertz.
     select
         Mask of the sensor's select lines.
+    resends
+        How often each word is asked for again.
     words
         Words in a batch; None: a frame of them.
 
     Attributes
     ----------
     faults
-        For each channel, how often each :class:`~tactbench.sensors.biotac.codec.Fault` occurred.
+        For each channel, how often which :class:`~tactbench.sensors.biotac.codec.Fault` was seen in the first reply to
+        its command.
+    resent
+        For each channel, how many words came good only when asked for again.
 
     Raises
     ------
     ValueError
-        For a frame, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
+        For a frame that is none, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
     """
 
     def __init__(
@@ -256,20 +267,27 @@ class FrameBatches:
         *,
         speed_hz: int,
         select: int = 1,
+        resends: int = 0,
         words: int | None = None,
     ) -> None:
         self._rows = FrameRows(frame)
         self._select = select
+        self._commands = 1 + resends
         self._words = len(frame) if words is None else words
         self._speed_hz = speed_hz
         self._position = 0
-        rate_hz = round(COMMAND_RATE.to("Hz"))
-        # Pauses of one word of 32 bits, in us: a quotient of whole numbers, 1e6 (1/rate - 32/speed).
-        self._pauses_us = (1_000_000 * (speed_hz - 32 * rate_hz), rate_hz * speed_hz)
-        self._command_us = round(SAMPLING_PAUSE.to("us"))
-        if self._paused_us(1) < self._command_us + WORD_PAUSE.to("us"):
-            raise ValueError(f"32 bits at {speed_hz} Hz and their pauses do not fit into a word's 1/{rate_hz} s")
+        rate_hz, bits = round(COMMAND_RATE.to("Hz")), 32 * self._commands
+        # Pauses of one word, in us: a quotient of whole numbers, 1e6 (1/rate - bits/speed).
+        self._pauses_us = (1_000_000 * (speed_hz - bits * rate_hz), rate_hz * speed_hz)
+        self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
+        self._within_us = self._commands * self._command_us + resends * self._word_us
+        if self._paused_us(1) < self._within_us + self._word_us:
+            raise ValueError(
+                f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
+                f"fit into a word's 1/{rate_hz} s"
+            )
         self.faults: dict[str, Counter[Fault]] = {name: Counter() for name in dict.fromkeys(frame)}
+        self.resent: Counter[str] = Counter()
 
     def _paused_us(self, words: int) -> int:
         """Return the sum of pauses in the first `words` words, rounded down."""
@@ -287,16 +305,18 @@ class FrameBatches:
         self._position += self._words
         for n in range(first, self._position):
             command = sampling_command(INDEX[self._rows.frame[n % len(self._rows.frame)]])
-            rest_us = self._paused_us(n + 1) - self._paused_us(n) - self._command_us
-            steps.append(SpiStep(command, self._select, self._command_us))
-            steps.append(SpiStep(FILLER, self._select, rest_us))
+            for k in range(self._commands):
+                steps.append(SpiStep(RESEND if k else command, self._select, self._command_us))
+                steps.append(SpiStep(FILLER, self._select, self._word_us))
+            rest_us = self._paused_us(n + 1) - self._paused_us(n) - self._within_us
+            steps[-1] = SpiStep(FILLER, self._select, rest_us)
         return first, steps
 
     def timing(self, first: int) -> Timing:
         """Return the times within the batch whose first word has position `first`."""
         over, under = 16 * 1_000_000_000, self._speed_hz
         begins = [
-            1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * n * over // under
+            1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * self._commands * n * over // under
             for n in range(self._words + 1)
         ]
         return Timing(tuple(begin + over // under for begin in begins[:-1]), begins[-1])
@@ -311,21 +331,21 @@ class FrameBatches:
         first
             What :meth:`next` returned with the batch.
         data
-            Bytes received during each of its steps.
+            What came in during each of its steps.
         t_ns
-            Time at which the host received it.
+            When it was in the host.
         device_ns
             When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
             without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
-            if no pause was longer than requested.
+            if no pause was longer than asked for.
         skipped
-            Words skipped so far, as whole frames: sequence numbers follow the time.
+            Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
         """
         sampled_ns, end_ns = self.timing(first)
-        for n, (after_ns, word) in enumerate(zip(sampled_ns, data[1::2], strict=True)):
-            reply = decoded(word)
-            if reply.fault is not None:
-                self.faults[self._rows.frame[(first + n) % len(self._rows.frame)]][reply.fault] += 1
+        stride = 2 * self._commands
+        for n, after_ns in enumerate(sampled_ns):
+            words = data[stride * n + 1 : stride * (n + 1) : 2]
+            reply = self._reply(self._rows.frame[(first + n) % len(self._rows.frame)], words)
             self._rows.put(
                 first + n + skipped,
                 reply.value or 0,
@@ -334,10 +354,26 @@ class FrameBatches:
                 None if device_ns is None else device_ns + after_ns,
             )
 
+    def _reply(self, channel: str, words: Sequence[bytes]) -> Reply:
+        """Return the first reply, or the first good one of the others if its parity was bad.
+
+        What never came is not taken from a resend: if the command was lost, the last two bytes are another channel's.
+        """
+        reply = decoded(words[0])
+        if reply.fault is not None:
+            self.faults[channel][reply.fault] += 1
+        if reply.fault in (Fault.PARITY, Fault.RESERVED):
+            for word in words[1:]:
+                again = decoded(word)
+                if again.fault is None:
+                    self.resent[channel] += 1
+                    return again
+        return reply
+
     def blocks(self) -> list[Block]:
         """Return the samples of rows that ended since the last call: raw counts with their quality."""
         return self._rows.blocks()
 
     def close(self) -> None:
-        """Complete all begun rows."""
+        """End the rows that are begun."""
         self._rows.close()

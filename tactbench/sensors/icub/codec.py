@@ -3,19 +3,18 @@
 A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
 [sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
 ``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
-(IM: ``CanBusSkin.cpp``) unless stated otherwise. None of it has been tested with a real board.
+(IM: ``CanBusSkin.cpp``) unless said. Nothing here has met a real board.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, UsageError
+from tactbench.plugin import Block, Quality, RigError, UsageError
 from tactbench.plugin.devices import CanFrame
 
 BIT_RATE = 1_000_000
@@ -25,17 +24,17 @@ HEAD, TAIL = 0x40, 0xC0
 """First byte of the frame with taxels 0 to 6, and of that with taxels 7 to 11 and the error word."""
 IN_HEAD = 7
 """Taxels in the head."""
-POLLING, SKIN = 2, 4
-"""Message classes, bits 8 to 10 of an identifier."""
+POLLING, OLD_SKIN, SKIN = 2, 3, 4
+"""Classes, bits 8 to 10 of an identifier. Class 3 also belongs to other analog sensors."""
 BROADCAST = 0xF
-"""Destination address that every board accepts."""
+"""Destination that every board takes as its own."""
 NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
-"""Low bits of the error word: a taxel did not acknowledge; the chip did not answer; bits that no source explains."""
+"""Low bits of the error word: some taxel gave no answer; the chip gave none; no source gives these a meaning."""
 
 
 @dataclass(frozen=True)
 class BoardSetup:
-    """Command that sets skin type, period and reading at rest, and disables all triangles [sourced: IF theSkin].
+    """Skin type, period and reading at rest; the board then has no triangle enabled [sourced: IF theSkin].
 
     Types: 0 compensated for temperature, 1 palm and fingertip, 2 not compensated, 3 hand of the ergoCub, 7 raw test,
     8 compensated, version 2. The defaults are IM's (the firmware's own: 50 ms, 245) with type 1.
@@ -48,10 +47,10 @@ class BoardSetup:
 
 @dataclass(frozen=True)
 class TriangleSetup:
-    """Command that sets shift and converter offset of triangles `first` to `last`, and enables or disables them.
+    """Shift, converter offset and enabling of triangles `first` to `last`.
 
-    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. It ignores
-    a range that does not ascend within 0 to 15 [sourced: IF theSkin].
+    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. A range
+    that does not ascend within 0 to 15 is passed over [sourced: IF theSkin].
     """
 
     first: int = 0
@@ -63,20 +62,40 @@ class TriangleSetup:
 
 @dataclass(frozen=True)
 class Transmit:
-    """Command to start or stop sending."""
+    """Start or stop sending."""
 
     on: bool
 
 
 @dataclass(frozen=True)
+class OldSetup:
+    """Old set-up. MTB4 firmware takes its own defaults instead of the numbers, a new baseline, and *starts*, 40 ms."""
+
+    timer: int = 1
+    cdc_offset: int = 0x2000
+    time: int = 0
+
+
+@dataclass(frozen=True)
+class OldSetup2:
+    """Second half of the old set-up; unknown to MTB4 firmware."""
+
+    shift: int = 2
+    shift_3_1: int = 0x22
+    no_load: int = 240
+    param: int = 0
+    enabled: int = 0xFFFF
+
+
+@dataclass(frozen=True)
 class VersionRequest:
-    """Request for the firmware's version, with the protocol that the host needs: the only command with an answer."""
+    """Ask for the firmware's version, naming the protocol that is needed: the only command with an answer."""
 
     major: int = 2
     minor: int = 0
 
 
-Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | VersionRequest
+Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | OldSetup | OldSetup2 | VersionRequest
 
 
 @dataclass(frozen=True)
@@ -88,17 +107,21 @@ class Version:
     firmware: tuple[int, int, int]
     protocol: tuple[int, int]
     fits: bool
-    """Whether the board supports the requested protocol."""
+    """The board speaks the protocol asked for."""
 
 
 def polling_id(board: int, source: int = 0) -> int:
-    """Return the identifier of a command to `board` (15: all boards) from `source`."""
-    return POLLING << 8 | source << 4 | board
+    """Return the identifier of a command to `board` (15: to all) from `source`; raises UsageError outside 0 to 15."""
+    return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
 
 
-def skin_id(board: int, triangle: int) -> int:
-    """Return the identifier of a triangle's two frames."""
-    return SKIN << 8 | board << 4 | triangle
+def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
+    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15.
+
+    `old`: of class 3, as early firmware sends.
+    """
+    kind = OLD_SKIN if old else SKIN
+    return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
 
 
 def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
@@ -110,22 +133,32 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
         Destination, 0 to 14, or :data:`BROADCAST`.
     source
         Sender, 0 for a host.
+
+    Raises
+    ------
+    UsageError
+        If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
     """
     match command:
         case BoardSetup(skin_type, period_ms, no_load):
             numbers = [0x4D, skin_type, period_ms, no_load]
         case TriangleSetup(first, last, shift, enabled, cdc):
-            numbers = [0x50, first, last, shift, int(enabled), *cdc.to_bytes(2, "little")]
+            _within("first triangle", first, _within("last triangle", last, 15))
+            numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
         case Transmit(on):
             numbers = [0x07, 0 if on else 1]
+        case OldSetup(timer, cdc, time):
+            numbers = [0x4C, 1, 1, timer, *_low_high(cdc), *_low_high(time)]
+        case OldSetup2(shift, shift_3_1, no_load, param, enabled_mask):
+            numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
         case VersionRequest(major, minor):
             numbers = [0x1C, major, minor]
-    return CanFrame(polling_id(board, source), bytes(numbers))
+    return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
 
 
 def read_command(frame: CanFrame) -> tuple[int, Command] | None:
     """Return (destination board, command), or None if `frame` is none of these commands or too short for it."""
-    if frame.extended or frame.id >> 8 != POLLING or not frame.data:
+    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
         return None
     board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
     found: Command
@@ -135,6 +168,10 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
         found = TriangleSetup(data[0], data[1], data[2], bool(data[3] & 1), data[4] | data[5] << 8)
     elif code == 0x07 and data:
         found = Transmit(data[0] == 0)
+    elif code == 0x4C and len(data) >= 7:
+        found = OldSetup(data[2], data[3] | data[4] << 8, data[5] | data[6] << 8)
+    elif code == 0x4E and len(data) >= 6:
+        found = OldSetup2(data[0], data[1], data[2], data[3], data[4] | data[5] << 8)
     elif code == 0x1C and len(data) < 7:  # with 7 it is a board's answer
         found = VersionRequest(*(*data, 0, 0)[:2])
     else:
@@ -143,14 +180,14 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
-    """Return the answer of `board` to the :class:`VersionRequest` of `to`."""
+    """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
     numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
-    return CanFrame(polling_id(to, board), bytes(numbers))
+    return CanFrame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
 
 
 def read_version(frame: CanFrame) -> tuple[int, Version] | None:
     """Return (board that answers, its version), or None if `frame` is no such answer."""
-    if frame.extended or frame.id >> 8 != POLLING or len(frame.data) != 8:
+    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or len(frame.data) != 8:
         return None
     code, kind, major, minor, build, protocol_major, protocol_minor, fits = frame.data
     if code & 0x7F != 0x1C:
@@ -159,9 +196,9 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 
 
 def skin_frames(
-    board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, t_ns: int = 0
+    board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
-    """Return the head and the tail frame of a sample.
+    """Return head and tail.
 
     Parameters
     ----------
@@ -169,10 +206,17 @@ def skin_frames(
         (12,) readings, 0 to 255.
     word
         Error word: bit 4 + i is taxel i out of range, then :data:`NO_ACK` and :data:`NOT_CONNECTED`.
+
+    Raises
+    ------
+    UsageError
+        If there are not 12 readings or a number does not fit its field.
     """
-    values = bytes(taxels)
-    identifier = skin_id(board, triangle)
-    errors = word.to_bytes(2, "big")
+    if len(taxels) != TAXELS:
+        raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
+    values = bytes(_within("a reading", value, 255) for value in taxels)
+    identifier = skin_id(board, triangle, old=old)
+    errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
     return (
         CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
         CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
@@ -207,7 +251,7 @@ def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
 
 @dataclass(frozen=True)
 class Sample:
-    """The 12 taxels of one triangle, without interpolated values or values of other samples."""
+    """12 taxels of one triangle; nothing in it is interpolated or carried over from another sample."""
 
     board: int
     triangle: int
@@ -220,24 +264,63 @@ class Sample:
     quality: tuple[Quality, ...]
     """(12,)"""
     word: int | None
-    """Error word; None if the tail is missing."""
+    """Error word; None if the tail is missing, or that of old firmware, which has none."""
+
+
+@dataclass
+class Counts:
+    """What was found in the frames of one triangle."""
+
+    samples: int = 0
+    missing_heads: int = 0
+    missing_tails: int = 0
+    far_apart: int = 0
+    """Samples whose halves are half a period apart or more."""
+    doubled: int = 0
+    """Frames kept out because they came twice."""
+    malformed: int = 0
+    """Frames kept out for their length."""
+    without_word: int = 0
+    """Samples whose tail had no error word."""
+    not_connected: int = 0
+    no_ack: int = 0
+    out_of_range: list[int] = field(default_factory=lambda: [0] * TAXELS)
+    """(12,) samples in which the error word called the taxel out of range."""
+    long_intervals: int = 0
+    """Samples more than 1.5 periods after the one before: both frames lost, or a late host; only a fit of the clocks
+    can tell."""
+
+    def named(self) -> dict[str, int]:
+        """Return what was wrong, by the names that a recording has, without what never was."""
+        found = {
+            "heads missing": self.missing_heads,
+            "tails missing": self.missing_tails,
+            "halves far apart": self.far_apart,
+            "frames doubled": self.doubled,
+            "frames of wrong length": self.malformed,
+            "samples without error word": self.without_word,
+            "samples not connected": self.not_connected,
+            "samples not acknowledged": self.no_ack,
+            "long intervals": self.long_intervals,
+        }
+        found |= {f"T{number} out of range": samples for number, samples in enumerate(self.out_of_range, 1)}
+        return {name: number for name, number in found.items() if number}
 
 
 @dataclass
 class _Triangle:
-    counts: Counter[str] = field(default_factory=Counter)
-    samples: int = 0
+    counts: Counts = field(default_factory=Counts)
     head: CanFrame | None = None
-    """Head that waits for its tail."""
+    """Waits for its tail."""
     tail: CanFrame | None = None
-    """The last tail."""
+    """The last one."""
     doubled: tuple[int, ...] = ()
     """Taxels of frames that came twice since the last sample."""
     last_ns: int | None = None
 
 
 class SkinDecoder:
-    """Converts frames of a bus or a log to samples.
+    """From frames, as they come from a bus or a log, to samples.
 
     A head and the tail behind it make a sample: frames keep their order on the bus. Half a period apart or more, all
     its taxels are SUSPECT; nine tenths, they are of two samples whose other halves were lost. Two heads or two tails in
@@ -249,20 +332,21 @@ class SkinDecoder:
     A taxel out of range or at 0 or 255 is SATURATED, one out of range also SUSPECT (the board's own test for broken
     taxels). No acknowledgement and reserved bits make all taxels SUSPECT, not connected makes all MISSING. A doubled
     frame makes its taxels SUSPECT in the sample it is found before. A board in the raw test (type 7) sends the low
-    bytes of its results, which cannot be distinguished from readings.
+    bytes of its results, which nothing in the frames tells from readings.
 
     Parameters
     ----------
     period_s
         The boards' period, seconds.
+    old_ids
+        Also take class 3, which other analog sensors on the bus share.
 
     Attributes
     ----------
     counts
-        (board, triangle) -> counts of what was wrong, by the names that a recording has. "Long intervals" are samples
-        more than 1.5 periods after the one before: both frames were lost, or the host was late.
+        (board, triangle) -> :class:`Counts`.
     foreign
-        Number of frames without skin data.
+        Frames that were no skin data.
 
     Raises
     ------
@@ -270,33 +354,36 @@ class SkinDecoder:
         If the period is not positive. No frame makes `feed` raise.
     """
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, *, old_ids: bool = False) -> None:
         if not period_s > 0:
             raise UsageError(f"A period of {period_s} s is not positive.", hint="Give the boards' period in seconds.")
         self.foreign = 0
         self._period_ns = 1e9 * period_s
+        self._classes = (OLD_SKIN, SKIN) if old_ids else (SKIN,)
         self._triangles: dict[tuple[int, int], _Triangle] = {}
 
     @property
-    def counts(self) -> dict[tuple[int, int], Counter[str]]:
+    def counts(self) -> dict[tuple[int, int], Counts]:
         """(board, triangle) -> what was found so far."""
-        return {key: +triangle.counts for key, triangle in self._triangles.items()}
+        return {key: triangle.counts for key, triangle in self._triangles.items()}
 
     def feed(self, frame: CanFrame) -> list[Sample]:
         """Return the samples, at most two, that `frame` completes or proves incomplete."""
         data = frame.data
-        if frame.extended or frame.id >> 8 != SKIN or not data or data[0] not in (HEAD, TAIL):
+        known = not frame.extended and 0 <= frame.id <= 0x7FF and frame.id >> 8 in self._classes
+        if not known or not data or data[0] not in (HEAD, TAIL):
             self.foreign += 1
             return []
         key = (frame.id >> 4 & 0xF, frame.id & 0xF)
         triangle = self._triangles.setdefault(key, _Triangle())
-        if len(data) != 8:
-            triangle.counts["frames of wrong length"] += 1
+        # Old firmware's tail ends with taxel 11.
+        if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
+            triangle.counts.malformed += 1
             return []
         head = triangle.head
         if data[0] == HEAD:
             if head is not None and self._near(head, frame) and head.data == data:
-                triangle.counts["frames doubled"] += 1
+                triangle.counts.doubled += 1
                 triangle.doubled += tuple(range(IN_HEAD))
                 return []
             triangle.head = frame
@@ -304,7 +391,7 @@ class SkinDecoder:
         last, triangle.head, triangle.tail = triangle.tail, None, frame
         if head is None:
             if last is not None and self._near(last, frame) and last.data == data:
-                triangle.counts["frames doubled"] += 1
+                triangle.counts.doubled += 1
                 triangle.doubled += tuple(range(IN_HEAD, TAXELS))
                 return []
             return [self._sample(key, triangle, None, frame)]
@@ -332,18 +419,18 @@ class SkinDecoder:
         first = head or tail
         assert first is not None
         if triangle.last_ns is not None and first.t_ns - triangle.last_ns > 1.5 * self._period_ns:
-            counts["long intervals"] += 1
+            counts.long_intervals += 1
         triangle.last_ns = first.t_ns
         taxels = (head.data[1:] if head else bytes(IN_HEAD)) + (tail.data[1:6] if tail else bytes(TAXELS - IN_HEAD))
-        word = int.from_bytes(tail.data[6:]) if tail else None
+        word = int.from_bytes(tail.data[6:]) if tail and len(tail.data) == 8 else None
         marks = [Quality.SATURATED if value in (0, 255) else Quality.GOOD for value in taxels]
         for taxel in triangle.doubled:
             marks[taxel] |= Quality.SUSPECT
         for taxel in out_of_range(word or 0):
             marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
-            counts[f"T{taxel + 1} out of range"] += 1
+            counts.out_of_range[taxel] += 1
         far_apart = head is not None and tail is not None and not self._near(head, tail)
-        counts["halves far apart"] += far_apart
+        counts.far_apart += far_apart
         if far_apart or tail is None or (word or 0) & (NO_ACK | RESERVED):
             marks = [mark | Quality.SUSPECT for mark in marks]
         if head is None:
@@ -352,24 +439,44 @@ class SkinDecoder:
             marks[IN_HEAD:] = [Quality.MISSING] * (TAXELS - IN_HEAD)
         if (word or 0) & NOT_CONNECTED:
             marks = [Quality.MISSING] * TAXELS
-        counts["heads missing"] += head is None
-        counts["tails missing"] += tail is None
-        counts["samples not acknowledged"] += bool((word or 0) & NO_ACK)
-        counts["samples not connected"] += bool((word or 0) & NOT_CONNECTED)
-        triangle.samples += 1
+        counts.missing_heads += head is None
+        counts.missing_tails += tail is None
+        counts.without_word += tail is not None and word is None
+        counts.no_ack += bool((word or 0) & NO_ACK)
+        counts.not_connected += bool((word or 0) & NOT_CONNECTED)
+        counts.samples += 1
         triangle.doubled = ()
-        return Sample(*key, triangle.samples - 1, first.t_ns, taxels, tuple(marks), word)
+        return Sample(*key, counts.samples - 1, first.t_ns, taxels, tuple(marks), word)
 
 
-def to_block(samples: Sequence[Sample]) -> Block:
+def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:
     """Return samples of one triangle as a block of the sensor's stream.
 
     Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well]. The block has no
     sequence, which stands for a device's own counter.
+
+    Raises
+    ------
+    RigError
+        If the samples are of several triangles.
     """
+    if len({(sample.board, sample.triangle) for sample in samples}) > 1:
+        raise RigError("The samples are of several triangles.", hint="Make one block for each (board, triangle).")
     return Block(
-        stream="taxels",
+        stream=stream,
         t_ns=np.array([sample.t_ns for sample in samples], dtype=np.int64),
         data=np.array([list(sample.taxels) for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
         quality=np.array([sample.quality for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
     )
+
+
+def _within(what: str, number: int, most: int) -> int:
+    if not 0 <= number <= most:
+        raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
+    return number
+
+
+def _low_high(number: int) -> tuple[int, int]:
+    """Little-endian bytes of a 16-bit number."""
+    _within("a 16-bit number", number, 0xFFFF)
+    return number & 0xFF, number >> 8

@@ -33,11 +33,11 @@ from tactbench.sensors.icub.codec import (
 from tactbench.sensors.icub.options import FingertipOptions
 
 SETTLE_S = 0.5
-"""Time from set-up to start, in which the board takes its baseline [sourced: icub-main CanBusSkin.cpp]."""
+"""From the set-up to the start: the board takes its baseline [sourced: icub-main CanBusSkin.cpp waits as long]."""
 ANSWER_S = 0.5
-"""Timeout of the answer with the version [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
+"""Until a version is missed [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
 MOST_FRAMES = 4096
-"""Limit on the frames of one call of `read`, so that it returns on a busy bus: 0.5 s of a full bus."""
+"""Taken by one call of `read`: a bus that never rests does not keep it for ever. 0.5 s of a full bus."""
 
 
 class FingertipDriver(Driver):
@@ -66,11 +66,13 @@ class FingertipDriver(Driver):
         stream = next((one for one in settings.streams if one.name == STREAMS[0].name), STREAMS[0])
         rate = Source(tag="derived", reference=f"the board is set up for {1e3 * options.period_s:g} ms")
         self._stream = stream.model_copy(update={"rate_hz": 1 / options.period_s, "rate_source": rate})
-        self._id = skin_id(options.board, options.triangle)
+        self._ids = {skin_id(options.board, options.triangle)}
+        if options.old_setup:
+            self._ids.add(skin_id(options.board, options.triangle, old=True))
         self._sent: set[tuple[int, bytes]] = set()
         self._sampling = False
         self._earlier: Counter[str] = Counter()
-        """Counts from before the last start."""
+        """Counts of what was read before the last start."""
         self._others = 0
         self._decoder = self._fresh_decoder()
         self._link = open_for(settings, "icub", CanLink, "can://socketcan/can0")  # type: ignore[type-abstract]
@@ -82,7 +84,7 @@ class FingertipDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of :class:`~tactbench.sensors.icub.codec.SkinDecoder`, of frames of others, and of the link."""
+        """See :meth:`~tactbench.sensors.icub.codec.Counts.named`; beside them what was not ours, or no data frame."""
         return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
 
     def identify(self) -> Mapping[str, str]:
@@ -91,7 +93,7 @@ class FingertipDriver(Driver):
         Raises
         ------
         LinkTimeout
-            If no device on the bus acknowledges (socketcan).
+            If nobody on the bus acknowledges (socketcan).
         LinkUnplugged
             If the adapter is gone.
         """
@@ -109,12 +111,12 @@ class FingertipDriver(Driver):
                 version = answer[1]
                 protocol = "{}.{}".format(*version.protocol)
                 if not version.fits:
-                    protocol += f" (not {request.major}.{request.minor}, which was requested)"
+                    protocol += f" (not {request.major}.{request.minor}, which was asked for)"
                 model = "MTB4" if version.board_type == 11 else f"type {version.board_type}"
                 return {**about, "model": model, "firmware": "{}.{}.{}".format(*version.firmware), "protocol": protocol}
         return {
             **about,
-            "firmware": f"no answer within {ANSWER_S:g} s: firmware that does not answer, or no such board",
+            "firmware": f"no answer within {ANSWER_S:g} s: old firmware has none, or there is no such board",
         }
 
     def start(self) -> None:
@@ -133,7 +135,7 @@ class FingertipDriver(Driver):
         until_ns = self._clock() + round(1e9 * SETTLE_S)
         while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
             with suppress(LinkTimeout):
-                self._link.receive(left_s)  # frames sent before the set-up
+                self._link.receive(left_s)  # from before, or of the old set-up, which starts by itself
         self._send(Transmit(on=True))
         self._sampling = True
 
@@ -173,13 +175,13 @@ class FingertipDriver(Driver):
         self._link.close()
 
     def _fresh_decoder(self) -> SkinDecoder:
-        return SkinDecoder(self._options.period_s)
+        return SkinDecoder(self._options.period_s, old_ids=self._options.old_setup)
 
     def _counted(self) -> Counter[str]:
-        """Return the counts of the decoder, which gets frames of one triangle only."""
+        """Return what the decoder has counted; it is given frames of one triangle only."""
         found = Counter({"frames that are no skin data": self._decoder.foreign})
         for counts in self._decoder.counts.values():
-            found.update(counts)
+            found.update(counts.named())
         return found
 
     def _send(self, command: Command) -> None:
@@ -191,7 +193,7 @@ class FingertipDriver(Driver):
         """Return the samples that `frame` completes."""
         if not self._sampling:
             return []
-        if frame.id == self._id and not frame.extended:
+        if frame.id in self._ids and not frame.extended:
             return self._decoder.feed(frame)
         self._others += (frame.id, frame.data) not in self._sent
         return []

@@ -1,4 +1,4 @@
-"""Emulator of a board with an iCub fingertip, alone on a CAN bus; it maps received frames to sent frames.
+"""A board with an iCub fingertip, alone on a CAN bus, as a model without input or output: frames in, frames out.
 
 What the board does is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
 ``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; where the model guesses, it is
@@ -37,6 +37,7 @@ from tactbench.sensors.icub.codec import (
     TAIL,
     TAXELS,
     BoardSetup,
+    OldSetup,
     Transmit,
     TriangleSetup,
     Version,
@@ -61,7 +62,7 @@ _CHANNELS = tuple(_REST)
 
 @dataclass(frozen=True)
 class BoardFault(Fault):
-    """A fault of a board; faults are deterministic.
+    """Something wrong with a board; nothing is random.
 
     `every` counts frames, of those that are dropped, doubled or late.
 
@@ -83,7 +84,7 @@ class BoardFault(Fault):
     }
 
     half: Literal["head", "tail"] | None = None
-    """Half of the samples whose frames are dropped, doubled or late; None: both."""
+    """Which frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
     """Bits of the error word."""
@@ -119,7 +120,7 @@ class Bus(DeviceEmulator):
     board, triangle
         Where the fingertip is; the board's other triangles have no chip.
     faults
-        Faults of the board; the list may be changed at any time.
+        What is wrong with the board; the list may be changed at any time.
     """
 
     def __init__(self, senses: Senses, *, board: int = 14, triangle: int = 0, faults: Iterable[BoardFault] = ()):
@@ -134,7 +135,7 @@ class Bus(DeviceEmulator):
         self._forget()
 
     def _forget(self) -> None:
-        """Reset the set-up to the firmware's defaults."""
+        """Take the firmware's defaults."""
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
         self._shift = 2
         self._enabled = set(range(16))
@@ -145,7 +146,7 @@ class Bus(DeviceEmulator):
         return min(self._reads_s, self._first_end_s())
 
     def _first_end_s(self) -> float:
-        """Return the time at which the first queued frame is sent."""
+        """Return when the first of the frames that leave has left."""
         if not self._leaving:
             return math.inf
         ready_s, _, frame = self._leaving[0]
@@ -186,6 +187,10 @@ class Bus(DeviceEmulator):
                 self._start(now_s)
             case Transmit(on=False):
                 self._reads_s = math.inf
+            case OldSetup():
+                self._forget()
+                self._setup = replace(self._setup, period_ms=40)
+                self._start(now_s)
             case VersionRequest(major, minor):
                 fits = VERSION.protocol[0] == major and VERSION.protocol[1] >= minor
                 self._send([version_frame(self._board, replace(VERSION, fits=fits), to=piece.id >> 4 & 0xF)], now_s)
@@ -197,14 +202,14 @@ class Bus(DeviceEmulator):
         self._reads_s = now_s + period_s if period_s else math.inf
 
     def _unplugged(self, now_s: float) -> bool:
-        """Return whether the board is without power, which resets its set-up."""
+        """Return whether it is without power, after which nothing of its set-up is left."""
         if not any(fault.name == "unplugged" and fault.active(now_s) for fault in self.faults):
             return False
         self._forget()
         return True
 
     def _read(self) -> None:
-        """Read the chips, and send head and tail of every enabled triangle."""
+        """Read the chips when that is due, and send head and tail of every enabled triangle."""
         now_s = self._reads_s
         if self._unplugged(now_s):
             return
@@ -246,7 +251,7 @@ class Bus(DeviceEmulator):
         return taxels, word
 
     def _send(self, frames: Iterable[CanFrame], now_s: float) -> None:
-        """Queue frames for the bus, after applying the faults of sending."""
+        """Make frames ready for the bus, after faults of sending."""
         for frame in frames:
             half = {HEAD: "head", TAIL: "tail"}.get(frame.data[0])
             copies, ready_s = 1, now_s

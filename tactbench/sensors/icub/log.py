@@ -1,4 +1,4 @@
-"""Reader of CAN logs of a bus with a fingertip."""
+"""CAN logs of a bus with a fingertip, as samples."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
+    OLD_SKIN,
     SKIN,
     TAIL,
     BoardSetup,
@@ -29,8 +30,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     """Read one fingertip's samples from a log in a format of python-can: candump's, Vector's ASC and BLF, ...
 
     Times count from the log's first message. Samples are those that the driver makes of the same frames; one whose
-    time is not after that of the sample before it is kept out and counted. Several buses in one log are not
-    distinguished.
+    time is not after that of the sample before it is kept out and counted. Buses of a log of several are not told
+    apart.
 
     Parameters
     ----------
@@ -49,18 +50,19 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         If no frames of such a fingertip are in it.
     """
     settings = read_options(LogOptions, options, "a log of icub")
+    classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
     halves: dict[tuple[int, int], list[CanFrame]] = {}
     commands = []
     frames, left_out = read_can_log(path)
     for frame in frames:
-        if not frame.extended and frame.id >> 8 == SKIN and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
+        if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
             halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
         elif (found := read_command(frame)) is not None:
             commands.append(found)
     board, triangle = _chosen(path, settings, sorted(halves), len(frames))
     half = halves[board, triangle]
     period_s, rate = _period(path, settings, half)
-    decoder = SkinDecoder(period_s)
+    decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
     samples = [sample for frame in half for sample in decoder.feed(frame)] + decoder.flush()
     if not samples:
         raise DataError(f"{path} has no whole frame of board {board}, triangle {triangle}.", hint="Record it again.")
@@ -70,7 +72,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             kept.append(sample)
     sent = [command for to, command in commands if to in (board, BROADCAST)]
     counts = {
-        **decoder.counts[board, triangle],
+        **decoder.counts[board, triangle].named(),
         "frames of others": len(frames) - len(half) - len(commands),
         **left_out,
         "samples kept out, not after the one before": len(samples) - len(kept),
@@ -93,7 +95,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
 
 
 def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
-    """Return the one (board, triangle) of `there` that matches the options."""
+    """Return the one (board, triangle) of `there` that fits `wanted`."""
     fitting = [
         (board, triangle)
         for board, triangle in there
@@ -103,18 +105,20 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
     if not fitting:
         raise DataError(
             f"{path} has no frames of that fingertip among its {frames} frames.",
-            hint=f"The log has: {listed or 'no skin frames'}.",
+            hint=f"There are: {listed}."
+            if there
+            else "Frames of early firmware (class 3) are taken with the option old_ids=true.",
         )
     if len(fitting) > 1:
         raise UsageError(
             f"{path} has frames of {len(fitting)} fingertips.",
-            hint=f"Choose one by the options board and triangle. The log has: {listed}.",
+            hint=f"Choose one by the options board and triangle. There are: {listed}.",
         )
     return fitting[0]
 
 
 def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
-    """Return the period in seconds and its source."""
+    """Return the period in seconds, and where it is from."""
     if settings.period_ms is not None:
         text = f"{settings.period_ms} ms between samples by the option period_ms"
         return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
@@ -122,7 +126,7 @@ def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[f
     steps = steps[steps > 0]
     if not len(steps):
         raise UsageError(
-            f"{path} has too few samples to determine their period.", hint="State it with the option period_ms."
+            f"{path} has too few samples to tell their period.", hint="State it with the option period_ms."
         )
     period_s = 1e-9 * float(np.median(steps))
     text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"

@@ -1,13 +1,13 @@
-"""Options of a fingertip in a rig file, and of a log of its bus."""
+"""What a rig file may say of a fingertip, and what may be said of a log of its bus."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tactbench.plugin.devices import Options
-from tactbench.sensors.icub.codec import BoardSetup, Command, Transmit, TriangleSetup
+from tactbench.sensors.icub.codec import BoardSetup, Command, OldSetup, OldSetup2, Transmit, TriangleSetup
 
 
 class FingertipOptions(Options):
@@ -31,19 +31,31 @@ class FingertipOptions(Options):
     shift: int = Field(default=0, ge=0, le=7)
     """One count is ``2**shift`` results of the converter."""
     cdc_offset: int = Field(default=0x2000, ge=0, le=0xFFFF)
-    """Offset of the converter, in the units of the AD7147."""
+    """Of the converter, as the AD7147 takes it."""
+    old_setup: bool = False
+    """Set the board up by the old messages, and take frames of class 3, too: for early firmware."""
+
+    @model_validator(mode="after")
+    def _only_what_is_sent(self) -> Self:
+        """Refuse what the old messages do not carry: the type, and the period, for which no source states a unit."""
+        if self.old_setup and self.model_fields_set & {"skin_type", "period_ms"}:
+            raise ValueError("the old set-up has neither skin_type nor period_ms; leave them out")
+        return self
 
     @property
     def period_s(self) -> float:
-        """Seconds between samples."""
-        return 1e-3 * self.period_ms
+        """Seconds between samples; of the old set-up 40 ms, as MTB4 firmware takes it [sourced: icub-firmware]."""
+        return 0.04 if self.old_setup else 1e-3 * self.period_ms
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands that set the board up, in order; afterwards it takes a baseline and does not send.
+        """What sets the board up, in order; afterwards it takes a baseline and does not send, MTB4's old set-up aside.
 
-        [sourced: icub-main CanBusSkin.cpp; the stop at the beginning is added because the board may be sending]
+        [sourced: icub-main CanBusSkin.cpp, but for the stop at the beginning: the board may be sending]
         """
+        if self.old_setup:
+            halves = (OldSetup(cdc_offset=self.cdc_offset), OldSetup2(shift=self.shift, no_load=self.no_load))
+            return (Transmit(on=False), *halves)
         return (
             Transmit(on=False),
             BoardSetup(self.skin_type, self.period_ms, self.no_load),
@@ -52,7 +64,7 @@ class FingertipOptions(Options):
 
 
 class LogOptions(Options):
-    """Options of a log: the triangle of the fingertip, and the period."""
+    """Which triangle of a log is the fingertip, and what the log does not say."""
 
     board: int | None = Field(default=None, ge=0, le=14)
     """None: the only one in the log."""
@@ -60,3 +72,5 @@ class LogOptions(Options):
     """None: the only one in the log."""
     period_ms: int | None = Field(default=None, ge=1, le=255)
     """Milliseconds between samples; None: the median interval of the log."""
+    old_ids: bool = False
+    """Also take frames of class 3, which early firmware sends and other analog sensors share."""

@@ -286,6 +286,18 @@ def test_another_frame_select_and_shorter_batches():
         assert rate_hz == pytest.approx(4400 / 3, rel=1e-4)
 
 
+def test_with_a_resend_words_of_bad_parity_are_replaced():
+    with virtual(Sensed(), "parity:every=7", options={"resends": 1}) as (driver, _, _):
+        driver.start()
+        streams = read_frames(driver, 10)
+        counts = driver.counts
+    assert not any(stream["quality"].any() for stream in streams.values())
+    bad = {name.removeprefix("parity "): n for name, n in counts.items() if name.startswith("parity ")}
+    assert counts == {**{f"parity {k}": n for k, n in bad.items()}, **{f"resent {k}": n for k, n in bad.items()}}
+    assert sum(bad.values()) == 63  # of 880 words, the odd ones of every seventh: the others are resends
+    assert streams["electrodes"]["sequence"].tolist() == [*range(10)]
+
+
 def test_an_unplugged_link_ends_the_reading_and_closes():
     with virtual(Sensed()) as (driver, link, _):
         driver.start()
@@ -304,10 +316,14 @@ def test_options_that_are_none_are_refused_before_the_link_is_opened():
         build(DriverSettings(lambda: pytest.fail("opened"), options={"frame": "E1 E20"}))
 
 
-def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed():
-    link = Adapter(emulator(Sensed()).exchange, Clock(), speed_hz=100_000)
-    with pytest.raises(RigError, match="100000 Hz"):
-        build(DriverSettings(lambda: link))
+@pytest.mark.parametrize(
+    ("speed_hz", "options", "said"),
+    [(100_000, {}, "100000 Hz, a BioTac takes 500000 to 1e"), (500_000, {"resends": 1}, "64 bits at 500000 Hz")],
+)
+def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed(speed_hz, options, said):
+    link = Adapter(emulator(Sensed()).exchange, Clock(), speed_hz=speed_hz)
+    with pytest.raises(RigError, match=said):
+        build(DriverSettings(lambda: link, options=options))
     with pytest.raises(LinkError, match="closed"):
         link.receive(0.0)
 

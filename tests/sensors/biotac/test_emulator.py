@@ -56,6 +56,8 @@ def test_bt_4_an_sp_has_more_electrodes():
         ("6113", "software version", "30323338"),
         ("6113", "software version", "30333031"),
         ("6115", "serial number", "42543250303232304231314530303034"),
+        ("6161", "cpu speed", "3E80"),
+        ("6170", "sampling frequency", "1130"),
     ],
 )
 def test_bt_4_properties(command, name, answer):

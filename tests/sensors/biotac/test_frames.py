@@ -90,6 +90,15 @@ def test_without_a_counter_times_are_counted_back_from_the_end():
     assert fast.t_ns == pytest.approx(1e9 * np.array(asked[1::2]), abs=3.0)
 
 
+def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
+    faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
+    block = run(batches, Emulator(wave, faults=faults), 2)["electrodes"]
+    assert set(block.quality[:, COLUMN["E5"]]) == {SUSPECT}
+    assert batches.faults["E5"] == {Fault.PARITY: 2}
+    assert batches.resent.total() == 0
+
+
 @pytest.mark.parametrize(("kind", "seen"), [("dropped-reply", Fault.NOT_CONNECTED), ("error-reply", Fault.ERROR)])
 def test_what_did_not_come_is_missing_and_nothing_else(kind, seen):
     batches = FrameBatches(speed_hz=SPEED_HZ)
@@ -133,9 +142,10 @@ def test_batches_without_a_reply_and_words_that_were_not_asked_for_are_gaps():
         st.lists(st.one_of(st.binary(max_size=3), st.integers(0, 4095).map(encoded)), min_size=20, max_size=20),
         max_size=6,
     ),
+    resends=st.integers(0, 1),
 )
-def test_any_replies_are_survived_and_the_next_frame_is_whole(replies):
-    batches = FrameBatches(speed_hz=SPEED_HZ, words=10)
+def test_any_replies_are_survived_and_the_next_frame_is_whole(replies, resends):
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=resends, words=10 // (1 + resends))
     for reply in replies:
         batches.take(batches.next()[0], reply, t_ns=0)
     batches.blocks()

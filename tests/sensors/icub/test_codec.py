@@ -10,6 +10,8 @@ from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BoardSetup,
+    OldSetup,
+    OldSetup2,
     SkinDecoder,
     Transmit,
     TriangleSetup,
@@ -40,6 +42,8 @@ COMMANDS = [
     ("t20E20700", Transmit(True)),
     ("t20E20701", Transmit(False)),
     ("t20F20701", Transmit(False)),
+    ("t20E84C01010100200000", OldSetup()),
+    ("t20E84E0222F000FFFF0A", OldSetup2()),
 ]
 """Lawicel text, which is identifier, length and data, and the command."""
 
@@ -54,6 +58,7 @@ PAIRS = """
     41F 40F0F0F0F0F0F0F0 C0F0F0F0F0F00001 SSSSSSSSSSSS
     4FF 4000000000000000 C00000000000FFF2 MMMMMMMMMMMM
     400 40FFFFFFFFFFFFFF C0FFFFFFFFFF0000 EEEEEEEEEEEE
+    3E3 40F0F0F0F0F0F0F0 C0F0F0F0F0F00000 GGGGGGGGGGGG
 """
 """Identifier, head and tail; quality of each taxel: good, at its end, out of range, suspect, missing."""
 MARKS = {"G": GOOD, "E": SATURATED, "R": SATURATED | SUSPECT, "S": SUSPECT, "M": MISSING}
@@ -94,15 +99,15 @@ def test_commands(text, command):
     assert read_command(wanted) == (identifier & 0xF, command)
 
 
-@pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 11)])
+@pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 12)])
 def test_pairs(line):
     number, head, tail, marks = line.split()
     identifier = int(number, 16)
     frames = frame(identifier, head), frame(identifier, tail)
-    board, triangle = identifier >> 4 & 0xF, identifier & 0xF
+    board, triangle, old = identifier >> 4 & 0xF, identifier & 0xF, identifier >> 8 == 3
     taxels, word = frames[0].data[1:] + frames[1].data[1:6], int(tail[-4:], 16)
-    assert skin_frames(board, triangle, taxels, word) == frames
-    decoder = SkinDecoder(PERIOD_S)
+    assert skin_frames(board, triangle, taxels, word, old=old) == frames
+    decoder = SkinDecoder(PERIOD_S, old_ids=True)
     assert decoder.feed(frames[0]) == []
     (sample,) = decoder.feed(frames[1])
     assert (sample.board, sample.triangle, sample.sequence) == (board, triangle, 0)
@@ -124,10 +129,8 @@ def test_error_words(entry):
         suspect = list(range(12)) if word & 0xD else taxels
         assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SUSPECT] == suspect
     counts = decoder.counts[14, 3]
-    assert [counts[f"T{taxel + 1} out of range"] for taxel in range(12)] == [
-        int(taxel in taxels) for taxel in range(12)
-    ]
-    assert (counts["samples not acknowledged"], counts["samples not connected"]) == (word & 1, word >> 1 & 1)
+    assert counts.out_of_range == [int(taxel in taxels) for taxel in range(12)]
+    assert (counts.no_ack, counts.not_connected) == (word & 1, word >> 1 & 1)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +151,18 @@ def test_version_as_the_firmware_lays_it_out():
     assert (read_version(request), read_command(request)) == (None, (14, VersionRequest(2, 1)))
 
 
-def test_a_period_that_is_none_is_refused():
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: command_frame(14, BoardSetup(period_ms=256)),
+        lambda: command_frame(14, TriangleSetup(first=5, last=4)),
+        lambda: skin_frames(14, 3, [0] * 11),
+        lambda: SkinDecoder(float("nan")),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused(wrong):
     with pytest.raises(UsageError):
-        SkinDecoder(float("nan"))
+        wrong()
 
 
 def test_halves_pair_in_their_order_on_the_bus():
@@ -159,7 +171,7 @@ def test_halves_pair_in_their_order_on_the_bus():
     decoder = SkinDecoder(PERIOD_S)
     (late,) = fed(decoder, head, replace(tail, t_ns=round(0.8 * PERIOD_NS)))
     assert (late.taxels, set(late.quality)) == (bytes([240] * 12), {SUSPECT})
-    assert decoder.counts[14, 3] == {"halves far apart": 1}
+    assert decoder.counts[14, 3].named() == {"halves far apart": 1}
 
 
 def test_equal_samples_in_a_burst_are_not_doubled():
@@ -167,7 +179,7 @@ def test_equal_samples_in_a_burst_are_not_doubled():
     decoder = SkinDecoder(PERIOD_S)
     samples = fed(decoder, *pair(), *pair(), *pair())
     assert [sample.sequence for sample in samples] == [0, 1, 2]
-    assert decoder.counts[14, 3]["frames doubled"] == 0
+    assert decoder.counts[14, 3].doubled == 0
 
 
 def test_frames_of_wrong_length_and_kind_are_kept_out():
@@ -176,19 +188,19 @@ def test_frames_of_wrong_length_and_kind_are_kept_out():
     wrong = (frame(0x4E3, "80" + HEAD[2:]), replace(head, extended=True), *(CanFrame(0x4E3, data) for data in (
         b"", head.data[:1], tail.data[:5])))  # fmt: skip
     assert fed(decoder, *wrong) == []
-    assert (decoder.foreign, decoder.counts[14, 3]["frames of wrong length"]) == (3, 2)
+    assert (decoder.foreign, decoder.counts[14, 3].malformed) == (3, 2)
     (sample,) = fed(decoder, head, tail)
     assert set(sample.quality) == {GOOD}
 
 
 frames = st.builds(
     CanFrame,
-    st.one_of(st.integers(-1, 0x1FFFFFFF), st.sampled_from([0x4E3, 0x20E, 0x2E0])),
+    st.one_of(st.integers(-1, 0x1FFFFFFF), st.sampled_from([0x4E3, 0x3E3, 0x20E, 0x2E0])),
     st.one_of(
         st.binary(max_size=64),
         st.builds(
             lambda first, rest: bytes([first]) + rest,
-            st.sampled_from([0x40, 0xC0, 0x4D, 0x50, 0x1C]),
+            st.sampled_from([0x40, 0xC0, 0x4C, 0x4D, 0x50, 0x1C]),
             st.binary(max_size=8),
         ),
     ),
@@ -201,7 +213,7 @@ frames = st.builds(
 @settings(max_examples=100, deadline=None)
 @example([CanFrame(0x4E3, bytes([0x40]) * 8, t_ns=-5)])
 def test_any_frames_are_survived_and_the_next_sample_is_whole(given_frames):
-    decoder = SkinDecoder(PERIOD_S)
+    decoder = SkinDecoder(PERIOD_S, old_ids=True)
     for one in given_frames:
         decoder.feed(one)
         found = read_command(one)
@@ -235,6 +247,6 @@ def test_every_frame_that_comes_is_in_a_sample_and_none_is_made_up(taxels, word,
         assert sample.taxels == (bytes(taxels[:7]) if head else bytes(7)) + (bytes(taxels[7:]) if tail else bytes(5))
     if samples:
         counts = decoder.counts[14, 3]
-        assert counts["heads missing"] == sum((period, 0) not in came for period in found)
-        assert counts["tails missing"] == sum((period, 1) not in came for period in found)
-        assert counts["frames doubled"] == 0
+        assert counts.missing_heads == sum((period, 0) not in came for period in found)
+        assert counts.missing_tails == sum((period, 1) not in came for period in found)
+        assert counts.doubled == 0

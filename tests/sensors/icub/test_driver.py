@@ -17,6 +17,8 @@ from tactbench.plugin.devices import (
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BoardSetup,
+    OldSetup,
+    OldSetup2,
     Transmit,
     TriangleSetup,
     command_frame,
@@ -88,7 +90,7 @@ def test_every_count_comes_through_whatever_the_set_up(counts, no_load, shift, s
 
 
 def test_streams_have_the_rate_of_the_set_up():
-    for options, rate_hz in (({}, 50.0), ({"period_ms": 40}, 25.0)):
+    for options, rate_hz in (({}, 50.0), ({"period_ms": 40}, 25.0), ({"old_setup": True}, 25.0)):
         driver, _ = in_virtual_time(**options)
         (stream,) = driver.streams
         assert stream.rate_hz == pytest.approx(rate_hz)
@@ -109,6 +111,30 @@ def test_the_set_up_in_order():
     ]  # fmt: skip
     assert [at_s for at_s, _ in told(link)] == pytest.approx([0, 0, 0, SETTLE_S, SETTLE_S], abs=1e-9)
     assert {frame.id & 0xF for frame in link.seen if frame.id >> 8 == 2} == {3}
+
+
+def test_the_old_set_up():
+    # MTB4 firmware takes its own defaults then: type 0, which takes off a share of T7's change, 245 at rest.
+    with started(lambda now_s: {**rising(now_s), "T7": 245.0}, triangle=4, old_setup=True) as (driver, link):
+        block = read_until(driver, link, 0.99)
+        assert [command for _, command in told(link)] == [
+            Transmit(False), OldSetup(1, 0x2000), OldSetup2(0, 0x22, 240), Transmit(True),
+        ]  # fmt: skip
+        # It sends all triangles, every 40 ms; what came before the start is dropped.
+        assert np.diff(block.t_ns) == pytest.approx(np.full(11, 40e6), abs=2)
+        wanted = [sensed(SETTLE_S + 0.04 * number) for number in range(1, 13)]
+        assert block.data.tolist() == [[*row[:6], 245, *row[7:]] for row in wanted]
+        assert set(driver.counts) == {"frames of others"}
+
+
+def test_frames_of_class_3_are_read_with_the_old_set_up():
+    with started(old_setup=True, faults=("dropped-frame",)) as (driver, link):
+        head, tail = skin_frames(14, 0, range(100, 112), old=True)
+        for frame in (head, CanFrame(tail.id, tail.data[:6])):
+            link.put(frame)
+        (block,) = driver.read(0.001)
+        assert block.data.tolist() == [list(range(100, 112))]
+        assert driver.counts == {"samples without error word": 1}
 
 
 def test_identify():
@@ -220,12 +246,12 @@ def test_a_tail_that_never_comes_holds_nothing_back():
 def test_frames_of_others_are_counted_and_left_out():
     with started() as (driver, link):
         for frame in (
-            *skin_frames(14, 1, [9] * 12), *skin_frames(13, 0, [9] * 12),
+            *skin_frames(14, 1, [9] * 12), *skin_frames(13, 0, [9] * 12), *skin_frames(14, 0, [9] * 12, old=True),
             CanFrame(0x4E0, b"\x40" + bytes(7), extended=True), CanFrame(0x20E, b"\x07\x00\x00"),
         ):  # fmt: skip
             link.put(frame)
         block = read_until(driver, link, 0.55)
-        assert driver.counts == {"frames of others": 6}
+        assert driver.counts == {"frames of others": 8}
     assert block.data.tolist() == [sensed(0.52), sensed(0.54)]
 
 
@@ -247,6 +273,7 @@ def test_its_own_frames_may_come_back():
     ("options", "said"),
     [
         ({"skin_type": 7}, "0, 1, 2 or 8"),
+        ({"old_setup": True, "period_ms": 20}, "old set-up has neither"),
     ],
 )
 def test_options_that_cannot_be_are_refused_before_the_link_is_opened(options, said):

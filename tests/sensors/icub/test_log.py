@@ -27,10 +27,10 @@ def write(file, frames, begin_s=EPOCH_S):
     return file
 
 
-def pairs(*at_ms, board=14, triangle=0):
+def pairs(*at_ms, board=14, triangle=0, old=False):
     found = []
     for number, at in enumerate(at_ms):
-        head, tail = skin_frames(board, triangle, [100 + number] * 12, t_ns=round(1e6 * at))
+        head, tail = skin_frames(board, triangle, [100 + number] * 12, old=old, t_ns=round(1e6 * at))
         found += [head, CanFrame(tail.id, tail.data, t_ns=tail.t_ns + 135_000)]
     return found
 
@@ -66,12 +66,19 @@ def test_one_of_several_fingertips_is_chosen(tmp_path):
     file = write(tmp_path / "log.asc", frames)
     with pytest.raises(UsageError, match=r"3 fingertips.*board 13, triangle 0; board 14, triangle 0; board 14, tri"):
         read_log(file, {})
-    with pytest.raises(DataError, match="board 13, triangle 0"):
+    with pytest.raises(DataError, match="There are: board 13"):
         read_log(file, {"board": 3})
     log = read_log(file, {"triangle": 3})
     assert log.blocks[0].t_ns.tolist() == [1_000_000, 41_000_000, 81_000_000]
     assert log.counts == {"frames of others": 12}
     assert log.streams[0].rate_hz == pytest.approx(25.0)
+
+
+def test_early_firmware_is_read_when_asked_for(tmp_path):
+    file = write(tmp_path / "log.blf", pairs(0, 20, 40, old=True))
+    with pytest.raises(DataError, match="old_ids"):
+        read_log(file, {})
+    assert len(read_log(file, {"old_ids": True}).blocks[0].data) == 3
 
 
 def test_the_period_can_be_stated(tmp_path):
