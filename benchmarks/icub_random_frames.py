@@ -13,12 +13,11 @@ import argparse
 import random
 import sys
 import time
-from dataclasses import fields
+from collections import Counter
 
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BoardSetup,
-    Counts,
     SkinDecoder,
     Transmit,
     TriangleSetup,
@@ -30,7 +29,7 @@ from tactbench.sensors.icub.codec import (
 from tactbench.sensors.icub.emulator import Bus
 
 PERIOD_S = 0.02
-COMMANDS = (0x4D, 0x50, 0x07, 0x4C, 0x4E, 0x1C)
+COMMANDS = (0x4D, 0x50, 0x07, 0x1C)
 
 
 def anything(generator: random.Random, t_ns: int) -> CanFrame:
@@ -51,7 +50,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     generator = random.Random(given.seed)
-    decoder = SkinDecoder(PERIOD_S, old_ids=True)
+    decoder = SkinDecoder(PERIOD_S)
     bus = Bus(lambda now_s: {"T1": generator.choice((-1e9, 0.0, 243.0, 1e9))}, triangle=3)
     calm = Bus(lambda now_s: {f"T{number}": 77.0 for number in range(1, 13)}, triangle=3)
     t_ns, began = 0, time.perf_counter()
@@ -80,9 +79,8 @@ def main() -> int:
             return 1
     spent_s = time.perf_counter() - began
     print(f"{given.count} frames, {decoder.foreign} foreign, {spent_s:.1f} s, nothing raised, recovered every time")
-    for field in fields(Counts):
-        found = [getattr(counts, field.name) for counts in decoder.counts.values()]
-        print(f"{field.name:15} {sum(sum(one) if isinstance(one, list) else one for one in found)}")
+    for name, number in sorted(sum(decoder.counts.values(), Counter()).items()):
+        print(f"{name:25} {number}")
     return 0
 
 

@@ -24,7 +24,7 @@ from tactbench.plugin.simulation import FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid, surface_of
 from tactbench.rigs.twin.rig import build
 
 SEED, RATE_HZ, WHY = 3, 100.0, "scene of the comparison with real recordings"
@@ -42,7 +42,7 @@ class Bench:
 
     def __init__(self, sensor: SensorDescriptor) -> None:
         self.skin, self.sheet = sensor.spec.skin, sensor.spec.skin.sheet
-        self.grid, self.outer = skin_grid(self.sheet), outer_radius_mm(self.sheet)
+        self.grid = skin_grid(self.sheet)
         self.channels = tuple(channel.name for channel in sensor.spec.channels("taxel"))
         self.normals = np.array([channel.normal for channel in sensor.spec.channels("taxel")])
         pressure = [channel.name for channel in sensor.spec.channels("dc_pressure")]
@@ -57,11 +57,12 @@ class Bench:
 
     def cap(self, radius_mm: float, x_mm: float, s_mm: float) -> np.ndarray:
         """Return the gap to a cap, or a flat surface of infinite radius, at a place of the sheet."""
-        return gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self.outer, self.sheet.dome, self.sheet.relief)
+        return gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), *surface_of(self.sheet))
 
     def plate(self, normal: np.ndarray) -> np.ndarray:
         """Return the gap to a flat plate that faces the finger from a direction, measured along that."""
-        surface = finger_surface_mm(self.grid, self.outer, self.sheet.dome, self.sheet.relief)
+        # On the cylinder the tangent plane at the midline is level: `below` is a height but for a constant.
+        surface = around_mm(self.grid, Contact(math.inf, 0.0, 0.0), *surface_of(self.sheet))
         height = sum(component * place for component, place in zip(normal, surface, strict=True))
         return np.max(height) - height
 

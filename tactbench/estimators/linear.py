@@ -48,17 +48,16 @@ def logistic(*, kind: str, seed: int, threads: int, C: float) -> Any:
 
 
 class Discriminant:
-    """Linear discriminants that say nothing where the means of all classes coincide.
+    """Linear discriminant analysis without warnings where the means of all classes coincide.
 
-    scikit-learn then divides zero by zero for the share of variance that each direction explains, which nobody asks for
-    here. Answers that are no numbers are refused by whoever asked.
+    scikit-learn then divides zero by zero for the share of variance of each direction, which is not used here.
     """
 
     def __init__(self, model: Any) -> None:
         self.model = model
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Discriminant:
-        """Learn from X (n, p) and y (n,); raises ValueError where no direction is left to tell classes apart in."""
+        """Learn from X (n, p) and y (n,); raises ValueError if no feature separates the classes."""
         try:
             with np.errstate(invalid="ignore"):
                 self.model.fit(X, y)

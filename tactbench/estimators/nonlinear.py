@@ -13,7 +13,7 @@ from tactbench.plugin import Estimator, FloatArray, NotApplicable
 
 
 class Forest:
-    """A forest whose answers do not depend on which thread was faster.
+    """A forest whose predictions do not depend on the timing of threads.
 
     scikit-learn adds up the trees in the order in which its threads finish them, so that the last bits of a mean change
     from run to run. Here each thread answers rows of its own and adds the trees in order; a single row is answered
@@ -55,10 +55,10 @@ def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
 
 
 class FastForest:
-    """A forest that says so when scikit-learn-intelex hands the work back to plain scikit-learn.
+    """A forest that raises an error when scikit-learn-intelex falls back to plain scikit-learn.
 
-    It does that in silence for what oneDAL cannot do (more than 6024 trees, some criteria and weights). A row under
-    this name would then be one of the plain forest.
+    The library does so silently for parameters that oneDAL does not support (more than 6024 trees, some criteria and
+    weights). A row under this name would then be one of the plain forest.
     """
 
     def __init__(self, model: Any) -> None:
@@ -123,7 +123,7 @@ def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:
 
 
 class Neighbours:
-    """Nearest neighbours that take all rows where there are fewer than were asked for."""
+    """Nearest neighbours that use all rows where there are fewer than `n_neighbors`."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
@@ -151,7 +151,7 @@ def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estim
 
 
 class OfUnitSpread:
-    """A regressor taught y less its mean, over its standard deviation; it answers in y's own unit.
+    """A regressor trained on y scaled to zero mean and unit standard deviation; it predicts in y's own unit.
 
     The width of a support-vector tube and the step of a gradient are numbers in the target's unit: without this a
     force in newtons and a curvature in 1/mm would be learned differently well.
@@ -174,7 +174,7 @@ class OfUnitSpread:
 
 
 class EveryNth:
-    """A learner taught every n-th row, n such that at most `rows` are left: its fit grows faster than the rows.
+    """An estimator trained on every n-th row, n such that at most `rows` are left: its fit grows faster than the rows.
 
     Rows that follow each other in time are nearly copies, so that every n-th one leaves out less than a random draw.
     """
@@ -209,7 +209,7 @@ def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: floa
 def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Estimator:
     """Return one hidden layer of `hidden` rectified units, taught by Adam (Kingma and Ba 2015).
 
-    A tenth of the training rows, drawn by the seed, says when to stop: ten epochs without gain. Its rows have
+    A tenth of the training rows, drawn by the seed, determines the end: ten epochs without gain. Its rows have
     neighbours one sample away among the others, so that it ends the training but does not choose well for another
     session; `max_iter` epochs are the most.
     """

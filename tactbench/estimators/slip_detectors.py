@@ -1,4 +1,4 @@
-"""Detectors of slip: each gives a frame a score, the higher the surer."""
+"""Detectors of slip, which give each frame a score that rises with the confidence in slip."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
 
 LEVELS = 5
-"""Of the wavelet transform, at most: at 2.2 kHz they reach down to 34 Hz."""
+"""Largest number of levels of the wavelet transform: at 2.2 kHz they reach down to 34 Hz."""
 WAVELET = "db2"
 BANDS = 16
-"""Of the spectrum."""
+"""Number of bands of the spectrum."""
 
 
 def always(*, kind: str, seed: int, threads: int) -> Any:
-    """Return what says slip in every frame."""
+    """Return a detector that reports slip in every frame."""
     from sklearn.dummy import DummyRegressor
 
     return DummyRegressor(strategy="constant", constant=1.0)
 
 
 def never(*, kind: str, seed: int, threads: int) -> Any:
-    """Return what says slip in no frame."""
+    """Return a detector that never reports slip."""
     from sklearn.dummy import DummyRegressor
 
     return DummyRegressor(strategy="constant", constant=0.0)

@@ -1,4 +1,4 @@
-"""Answers that look at nothing: what any other has to beat."""
+"""Baselines that use no features."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Questions asked of recordings."""
+"""Tasks: targets, scenes, metrics and splits of a benchmark."""

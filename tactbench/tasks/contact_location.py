@@ -1,4 +1,4 @@
-"""Where on the skin something touches, from taxels.
+"""Location of the contact on the skin, from taxels.
 
 Its recordings are of a ball pressed at places scattered over the skin, each with the place as a reference.
 """

@@ -1,4 +1,4 @@
-"""What the makers of eFlesh published, for the tasks that it may stand beside."""
+"""Published scores of eFlesh, for the tasks that compare with them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tactbench.plugin import Published
 
 
 def published(score_n: float, sensor: str, title: str) -> Published:
-    """Return one of their errors [N], with what must be known to compare with it."""
+    """Return a published error [N], with remarks on its conditions."""
     return Published(
         score=score_n,
         protocol="deployable",

@@ -41,7 +41,7 @@ SCENES = tuple(
 
 _FLAT = (None,)
 
-# Assumed to be nothing to whoever grips with the sensor: the least force that the iCub's fingertip is reported to
+# Assumed to be negligible for grasping: the least force that the iCub's fingertip is reported to
 # detect (Jamali et al. 2015, A new design of a fingertip for the iCub hand).
 SAME_N = 0.05
 
@@ -90,7 +90,7 @@ def tactbench_tasks() -> list[TaskDescriptor]:
 
 @hookimpl
 def tactbench_profiles() -> list[ProfileDescriptor]:
-    """Offer by name what a task imports from the door."""
+    """Offer the force profiles of the plugin interface by name."""
     above_0 = 1e-3
     peak = {"unit": "N", "text": "the largest force"}
     rise = {"unit": "s", "least": above_0, "text": "how long the way up to the first force takes"}
@@ -133,5 +133,5 @@ def _profile(
         name=name,
         title=title,
         where=f"tactbench.plugin:{function.__name__}",
-        parameters={one: Parameter(default=own[one].default, **said) for one, said in parameters.items()},
+        parameters={one: Parameter(default=own[one].default, **fields) for one, fields in parameters.items()},
     )

@@ -1,4 +1,4 @@
-"""Will the grasped object slip when it is lifted? From one static reading before the lift."""
+"""Prediction, from one static reading before the lift, of whether a grasped object will slip."""
 
 from __future__ import annotations
 

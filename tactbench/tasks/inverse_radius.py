@@ -1,4 +1,4 @@
-"""How curved the surface is, as a number, so that a radius never shown may be interpolated.
+"""Curvature of the surface as a number, so that unseen radii can be interpolated.
 
 Karl et al. 2016 classify five caps and hope to "linearly interpolate unseen curvature radii". Here the curvature 1/R
 itself is predicted, a flat surface being 0, and each radius is left out in turn. The smallest and the largest curvature

@@ -1,4 +1,4 @@
-"""Which object a hand has closed on, from taxels, one answer a frame."""
+"""Identity of the grasped object from taxels, one answer per frame."""
 
 from __future__ import annotations
 

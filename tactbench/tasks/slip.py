@@ -8,8 +8,8 @@ from tactbench.tasks.slip_scenes import SLIP_SCENES
 TACTBENCH_API = 2
 
 FRAMES = SlipTarget(hop_s=0.01, window_s=0.1)
-# Assumed, all of it: a gripper that is told within half a second can still hold on, and asks for no second alarm within
-# one; what is told before the label's 0.1 mm is early by less than what the surface needs for it at 1 mm/s.
+# All assumed: a gripper can still react to an alarm within half a second and needs no second one within a second; an
+# alarm before the labelled 0.1 mm may be early by the time in which a surface at 1 mm/s slides as far.
 POLICY = AlarmPolicy(
     window_before_s=0.1,
     window_after_s=0.5,
@@ -18,7 +18,7 @@ POLICY = AlarmPolicy(
     minimum_length_s=0.02,
     false_alarm_time="disturbances",
 )
-# How much a channel moved within the frame, and no level of it.
+# Measures of change within the frame; levels are left out.
 MOVES = tuple(Summary(measure=measure) for measure in ("change", "mean-step", "deviation", "range"))
 BAND = Summary(measure="band-energy", band_hz=(30.0, 200.0), kinds=("ac_pressure",))
 
@@ -48,7 +48,7 @@ SPEC = TaskSpec(
     replicates=1,
 )
 
-# Whoever has a fast stream may owe it the answer: the same sensors without it.
+# The same sensors without their fast streams, which may be what makes a good score.
 TAXELS = SPEC.model_copy(
     update={
         "name": "slip-taxels",

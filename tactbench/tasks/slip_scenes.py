@@ -17,19 +17,19 @@ _CHOICE = "a condition of the slip campaign"
 SESSIONS: Mapping[str, Role] = MappingProxyType(
     {"train-1": "train", "train-2": "train", "validation": "validation", "test": "test"}
 )
-"""Sessions of the campaign and what each is for."""
+"""Sessions of the campaign and their roles."""
 SPEEDS_MM_S = (10.0, 20.0, 50.0)
 FORCES_N = (0.5, 1.5)
 REFERENCE_HZ = 500.0
-"""Of the reference clock: an onset is labelled to 2 ms."""
+"""Rate of the reference clock: an onset is labelled to 2 ms."""
 HOLD_S, PRESS_S = 0.5, 0.3
-"""Nothing is pressed for the one; the force rises within the other."""
+"""Durations without contact, and of the rise of the force."""
 EARLIEST_S, SPREAD_S = 1.6, 1.0
-"""When a drag begins: at the earliest, and how much later at most, so that no clock tells it."""
+"""Earliest start of a drag, and its largest delay; it varies so that no clock predicts it."""
 SLIP_S = 4.6
 """Length of a recording with a slip."""
 PATTERN_S = 12.0
-"""Within which a kind of disturbance does what it does, from 3 s on."""
+"""Duration of a pattern of disturbances; the first begins at 3 s."""
 TIMES: Mapping[Role, int] = MappingProxyType({"train": 1, "validation": 3, "test": 3})
 """How many recordings there are of each disturbance, and how many patterns in each: six disturbances, nine times, are
 eleven minutes, in which one false alarm a minute is more than ten alarms."""
@@ -40,7 +40,7 @@ START_MM = 0.02
 follows (0.11 mm), and of the displacement that is labelled a slip."""
 SLOT_S = 60.0
 _GOLDEN = 0.6180339887498949
-"""Multiples of it modulo 1 spread evenly."""
+"""Fraction of the golden ratio, whose multiples modulo 1 spread evenly."""
 
 
 def _surface(static: float, kinetic: float, rms_um: float, roll_off_mm: float) -> Surface:
@@ -58,7 +58,7 @@ SURFACES: Mapping[str, Surface] = MappingProxyType({
     "coarse": _surface(0.6, 0.5, 150.0, 1.0),
     "knit": _surface(0.9, 0.78, 100.0, 2.0),
 })  # fmt: skip
-"""What is dragged: a polished surface, the twin's default, a coarse one, and a knitted fabric."""
+"""Dragged surfaces: a polished one, the twin's default, a coarse one, and a knitted fabric."""
 
 Points = list[tuple[float, float]]
 """Times [s] and forces [N]."""
@@ -100,7 +100,7 @@ def ripples(force_n: float, patterns: int) -> Points:
 DISTURBANCES: Mapping[str, Callable[[float, int], Points]] = MappingProxyType(
     {"presses": presses, "taps": taps, "ripples": ripples}
 )
-"""What the normal force does without any slip, by kind."""
+"""Patterns of the normal force without slip, by kind."""
 
 
 def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:

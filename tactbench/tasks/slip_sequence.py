@@ -13,7 +13,7 @@ SPEC = TaskSpec(
     kind="classification",
     target=LabelTarget(name="slip"),
     answer_per="recording",
-    # How much a channel moved, and no level of it: where a channel rests may tell the occasion.
+    # Measures of change; levels are left out: the rest level of a channel may reveal the session.
     summaries=(
         Summary(measure="deviation"),
         Summary(measure="mean-step"),

@@ -1,8 +1,8 @@
-"""The recordings behind the tasks: which surface is pressed where, on which unit, in which session.
+"""The recordings of the tasks: surfaces, places, units and sessions.
 
-One campaign serves several tasks: each takes the surfaces it asks about, and a scene that two of them name is recorded
+One campaign serves several tasks: each takes the surfaces that it needs, and a scene in two of them is recorded
 once. The paper's own three sessions are as Karl et al. 2016 describe them. The campaigns beyond the paper take 1000
-samples in the paper's 60 s: neighbouring rows of a slow ramp tell little new. All begin an hour after power-on, a
+samples in the paper's 60 s: neighbouring rows of a slow ramp hold little new. All begin an hour after power-on, a
 scene's default, so that a cap, a placement, a unit or a session differs by itself and not by the sensor's warm-up.
 """
 
@@ -29,7 +29,7 @@ PLACES_MM = ((0.0, 0.0), (1.5, 0.0), (-1.5, 0.0), (0.0, 1.5), (0.0, -1.5))
 UNITS = ("1", "2", "3", "4", "5")
 TRAINING_SESSIONS = 10
 TEST_SESSIONS = 5
-"""The least that an interval over sessions can be made of."""
+"""Fewest sessions from which an interval over sessions can be computed."""
 FEW = (1, 2, 5, 10)
 """Training sessions of the few-shot splits."""
 
@@ -46,7 +46,7 @@ def indenter(radius_mm: float | None) -> Indenter:
 
 
 def labels(radius_mm: float | None) -> dict[str, str | float | int]:
-    """Return what a surface is, for every task that may ask: its radius, and its curvature in 1/m."""
+    """Return the labels of a surface for all tasks: its radius, and its curvature in 1/m."""
     if radius_mm is None:
         return {"cap_radius_mm": FLAT, "inverse_radius_per_m": 0.0}
     return {"cap_radius_mm": radius_mm, "inverse_radius_per_m": 1e3 / radius_mm}
@@ -60,8 +60,8 @@ def surface_name(radius_mm: float | None) -> str:
 def papers_caps() -> tuple[PlannedScene, ...]:
     """Return the paper's curvature recordings: every cap once in each of three sessions, one after the other.
 
-    The paper does not state in which order the caps followed each other: it is drawn, session by session, so that a cap
-    is not told by how far the sensor has warmed up.
+    The paper does not state in which order the caps followed each other: it is drawn, session by session, so that the
+    warm-up of the sensor does not reveal the cap.
     """
     return tuple(
         PlannedScene(

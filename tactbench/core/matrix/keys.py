@@ -1,14 +1,14 @@
-"""Keys: what decides a recording or a result, and nothing else, in one digest.
+"""Keys of recordings and results: digests of everything that determines them.
 
-What decides is listed in sections: the configuration, the versions, the source of each package (which holds its
-descriptors), the data. A key is the digest of its sections; ``tactbench why`` compares the sections of two keys.
+A key is the digest of its sections: configuration, versions, source of each package (with its descriptors) and data.
+``tactbench why`` compares the sections of two keys.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,22 +27,28 @@ _canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), default=rep
 
 @dataclass
 class Keys:
-    """The keys of one run: what does not change from cell to cell is worked out once."""
+    """The keys of one run."""
 
     registry: Registry
-    _answers: dict[tuple[str, str], Sections] = field(default_factory=dict)
-    _makers: dict[tuple[str, ...], Sections] = field(default_factory=dict)
 
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
-        sections = {**self._answering(cell), "configuration": configuration_of(cell)}
-        key = digest_of(_canonical({**sections, "data": list(data.values())}))
-        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
+        task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
+        features_by = self.registry.tasks[cell.task].spec.features_by
+        modules = [task.module, estimator.module, estimator.descriptor.where, features_by]
+        sections = {
+            "task": task.declared or cell.task,
+            "estimator": cell.estimator,
+            "versions": versions(estimator.descriptor.distributions),
+            "source": sources_of(filter(None, modules), ANSWERING),
+            "configuration": configuration_of(cell),
+        }
+        return _keyed(sections, data)
 
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
     ) -> tuple[str, Sections]:
-        """Return the key of a cell that a caller in Python gives objects for, as to `solve`, and its sections.
+        """Return the key, and its sections, of a cell for which a caller in Python gives objects, as to `solve`.
 
         Raises ValueError as :func:`identity_of` does.
         """
@@ -59,23 +65,7 @@ class Keys:
             "source": sources_of(modules, ANSWERING),
             "configuration": configuration_of(cell),
         }
-        key = digest_of(_canonical({**sections, "data": list(data.values())}))
-        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
-
-    def _answering(self, cell: Cell) -> Sections:
-        pair = cell.task, cell.estimator
-        if pair not in self._answers:
-            task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
-            features_by = self.registry.tasks[cell.task].spec.features_by
-            modules = [task.module, estimator.module, estimator.descriptor.where]
-            modules += [features_by] if features_by else []
-            self._answers[pair] = {
-                "task": task.declared or cell.task,
-                "estimator": cell.estimator,
-                "versions": versions(estimator.descriptor.distributions),
-                "source": sources_of(modules, ANSWERING),
-            }
-        return self._answers[pair]
+        return _keyed(sections, data)
 
     def of_recording(
         self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: RigFile | None = None
@@ -85,42 +75,43 @@ class Keys:
         return digest_of(_canonical({**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}))
 
     def _making(self, sensor: str, rig: str, rig_file: RigFile | None, scene: Scene) -> Sections:
-        """Return what all recordings of one sensor by one rig share.
+        """Return the sections of a recording's key that do not depend on its scene's content, role and seed.
 
         Notes
         -----
-        What real devices gave stays true when the code that read them changes: of them it is sensor, rig and rig file
-        alone, so that nobody has to press everything again.
+        Recordings of real devices stay valid when the code of their drivers changes: their key covers sensor, rig and
+        rig file alone.
         """
-        effects = taking_part(self.registry, self.registry.sensors[sensor], scene)
-        shape = scene.indenter.shape
         stated = "" if rig_file is None else rig_file.model_dump_json()
-        made = (sensor, rig, stated, str(shape), *(effect.descriptor.name for effect in effects))
-        if made not in self._makers:
-            sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
-            if rig_file is None or rig_file.emulated:
-                owner, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
-                modules = [owner.module, carrier.module, carrier.descriptor.where]
-                modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
-                modules += [] if rig_file is None else self._behind(rig_file)
-                for effect in effects:
-                    modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-                if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig complains
-                    indenter = self.registry.indenters.owned(shape)
-                    modules += [indenter.module, indenter.descriptor.where]
-                sections |= {"versions": versions(), "source": sources_of(modules, RECORDING)}
-            self._makers[made] = sections
-        return self._makers[made]
+        sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
+        if rig_file is not None and not rig_file.emulated:
+            return sections
+        owner, carrier, shape = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig), scene.indenter.shape
+        modules = [owner.module, carrier.module, carrier.descriptor.where]
+        modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
+        modules += [] if rig_file is None else self._behind(rig_file)
+        for effect in taking_part(self.registry, owner.descriptor, scene):
+            modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
+        if shape is not None and shape in self.registry.indenters:  # the rig refuses an unknown one
+            indenter = self.registry.indenters.owned(shape)
+            modules += [indenter.module, indenter.descriptor.where]
+        return sections | {"versions": versions(), "source": sources_of(modules, RECORDING)}
 
     def _behind(self, devices: RigFile) -> list[str]:
-        """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""
+        """Return the modules of a rig file's devices, and of the simulation behind the emulated ones."""
         names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
         physics = self.registry.rigs.owned(devices.emulation.physics)
         return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
 
 
+def _keyed(sections: Sections, data: Mapping[Path, str]) -> tuple[str, Sections]:
+    """Return the key of a result and its sections; the names of recordings are shown but do not count."""
+    key = digest_of(_canonical({**sections, "data": list(data.values())}))
+    return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
+
+
 def configuration_of(cell: Cell) -> Sections:
-    """Return what a cell's key covers of its configuration."""
+    """Return the part of a cell's configuration that its key covers."""
     return {
         "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
         "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,
@@ -134,14 +125,14 @@ def differences(
     *,
     same: Callable[[Any, Any], bool] = lambda old, new: _canonical(old) == _canonical(new),
 ) -> list[str]:
-    """Return one sentence for everything in which two mappings differ.
+    """Return a sentence for each difference of two mappings.
 
     Parameters
     ----------
     within
-        What each sentence begins with.
+        Beginning of each sentence.
     same
-        Compares what is no mapping; by default as JSON.
+        Comparison of values that are not mappings; by default as JSON.
     """
     found = []
     for name in sorted({*before, *now}):

@@ -1,4 +1,4 @@
-"""Result folders of several machines become one.
+"""Merging of result folders of several machines.
 
 The result is the union of the folders' cells, by name. Of two of one name
 
@@ -32,7 +32,7 @@ SAME_SCORE = 1e-9
 """Relative difference of scores of the same cell on two kinds of processor: they add millions of terms in another
 order."""
 _SHOWN = 10
-"""Contradictions named in a message; the others are counted."""
+"""Number of contradictions that a message lists."""
 _DECIDES = ("configuration", "task", "estimator", "versions", "source")
 """Sections of a key that two results of one name must share."""
 
@@ -42,21 +42,21 @@ SEED_DECIDES = (
     "n_train", "n_test",
     "counts", "chosen", "scores", "confusion", "classes", "split", "stamps", "dagger",
 )  # fmt: skip
-"""Keys of a row that do not depend on machine or hour, but for the last bits of numbers."""
+"""Keys of a row that depend on configuration and seed alone, except for the last bits of numbers."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """What was merged."""
+    """Summary of a merge."""
 
     rows: tuple[Row, ...]
     recordings: int
     left_out: tuple[str, ...]
-    """What could not be used, in sentences."""
+    """Sentences about cells that could not be read."""
 
 
 def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | None = None) -> Merged:
-    """Make `out` from all `folders`; nothing is left of it if anything goes wrong.
+    """Merge `folders` into the new folder `out`, which does not remain if that fails.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
     out
         A folder that does not exist yet.
     also
-        Writes more files into the new folder, which it is given, before that gets its name.
+        Function that writes further files into the new folder, before that gets its name.
 
     Raises
     ------
@@ -108,13 +108,13 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
 
 
 def _precedence(one: tuple[Row, Store]) -> tuple[Any, ...]:
-    """Return what the result that is kept has less of than any other of its name."""
+    """Return the sort key of a result: of results with one name the smallest is kept."""
     row, _ = one
     return STATUSES.index(row["status"]), row["latency_n"] is None, row["host"], row["key"]
 
 
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
-    """Return in what two finished cells of one name differ that should be the same; empty if in nothing."""
+    """Return the inadmissible differences of two finished cells of one name, or an empty string."""
     first, second = ({name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other))
     for sections in (first, second):  # a run times its first replicate, which may be another's second
         sections["configuration"] = {**(sections["configuration"] or {}), "timed": None}
@@ -132,7 +132,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _link(path: Path, target: Path) -> None:
-    """Put a recording, which never changes, at a second place: as a link where the disk can, else as a copy."""
+    """Link a recording, which never changes, to a second path; copy it where links are not supported."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(path, target)
@@ -142,7 +142,7 @@ def _link(path: Path, target: Path) -> None:
 
 @contextmanager
 def _made(out: Path) -> Iterator[Path]:
-    """Give a folder to fill, which becomes `out` when all went well and is removed when not."""
+    """Yield a temporary folder, which is renamed to `out` on success and removed on failure."""
     aside = out.absolute().with_name(f".{out.absolute().name}.{os.getpid()}.merging")
     with writing(out):
         try:

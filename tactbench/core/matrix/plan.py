@@ -1,4 +1,4 @@
-"""From a matrix to its cells: every name is checked before anything is run."""
+"""The cells of a matrix; every name is checked before anything runs."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _AS_PLANNED = Simulation()
 ALIKE = (
     "sensor", "task", "rig", "protocol", "split", "estimator", "seed", "declared_task", "include_incomplete",
 )  # fmt: skip
-"""What a row and a cell call alike."""
+"""Fields that rows and cells have in common."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One (sensor, task, rig, protocol, estimator), answered on one of its replicates."""
+    """One combination of sensor, task, rig, protocol and estimator, on one replicate."""
 
     sensor: str
     task: str
@@ -43,15 +43,15 @@ class Cell:
     params: tuple[tuple[str, Any], ...]
     baseline: bool
     seed: int
-    """Of the scenes that this replicate records and of its estimators; it names the replicate."""
+    """Random seed of this replicate's scenes and estimators; it identifies the replicate."""
     timed: bool = True
-    """Whether fit time and latency are measured, with nothing else of the run at work: of a run's first replicate."""
+    """Whether fit time and latency are measured, while no other cell runs; true of the first replicate."""
     simulation: Simulation = _AS_PLANNED
-    """How a simulated rig is asked to carry out its scenes."""
+    """Settings of a simulated rig."""
     include_incomplete: bool = False
     """Whether incomplete recordings take part."""
     declared_task: str = ""
-    """What the recordings declare of the task, as its rows tell it in JSON; empty: it is an installed one."""
+    """Declaration of the task in the recordings, as JSON; empty for an installed task."""
 
     @cached_property
     def name(self) -> str:
@@ -63,7 +63,7 @@ class Cell:
 
 
 def cell_of(row: Mapping[str, Any]) -> Cell:
-    """Return the cell that a row answers."""
+    """Return the cell of a row."""
     cell = Cell(
         **{name: row[name] for name in ALIKE},
         params=tuple(sorted(row["params"].items())),
@@ -71,22 +71,13 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
         timed=row["status"] != "done" or row["latency_n"] is not None,
         simulation=Simulation.model_validate(row["simulation"]),
     )
-    # A row says which split was taken; its name, whether that one was asked for or found.
+    # A row has the split that was taken; its name contains the split only if the matrix named one.
     found = replace(cell, split=None)
     return found if found.name == row["cell"] else cell
 
 
 def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:
-    """List the cells of `matrix`, in the order in which they are run and stored.
-
-    Parameters
-    ----------
-    matrix
-        What to run.
-    sensors
-        The sensors to run it on, already checked.
-    registry
-        Where tasks and estimators are looked up.
+    """List the cells of `matrix` on known `sensors`, in the order in which they are run and stored.
 
     Raises
     ------
@@ -126,16 +117,16 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         include_incomplete=matrix.include_incomplete,
                         declared_task=owned.declared,
                     )
-                    cells[cell] = None  # once, in the order in which they were asked for
+                    cells[cell] = None  # each once, in the order of the matrix
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
 
 
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
-    """Return `cells` and, after them, those that show what their recordings give away.
+    """Return `cells`, followed by cells that probe them for leakage.
 
-    For every answer, and for its task's own trivial ones: the same under `deployable` with kept apart what the cell
-    keeps apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not
-    probed; UsageError where there is no other.
+    Every cell, except for baselines of other tasks, is also evaluated under `deployable` with its own split, under
+    `first-frame`, and with shuffled rows. A split in time separates no recordings and is not probed; UsageError is
+    raised if there is no other.
     """
     if cells and all(cell.split == "in-session" for cell in cells):
         raise UsageError(
@@ -152,7 +143,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
         if rules.roles_only and task.splits[:1] == ("roles",):
             same = replace(cell, protocol=DEPLOYABLE.name, split=None)
             if same in planned:
-                continue  # asked for already, and probed as such
+                continue  # already planned, and probed by itself
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
         added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
@@ -161,9 +152,9 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
 
 
 def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
-    """Return every protocol asked for with every split asked for.
+    """Return all combinations of the chosen protocols and splits.
 
-    Where several are asked for, a pair that does not go together becomes a row that says so; a single one is refused.
+    An incompatible combination is refused if it is the only one; among others it becomes a row with the reason.
     """
     for name in choice.protocol:
         if without_options(name) not in task.protocols and not is_probe(name):
@@ -174,19 +165,19 @@ def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
     if all(not serves(protocol, split) for protocol, split in ways):
         protocol, split = ways[0]
         raise UsageError(
-            f"Protocol {protocol!r} splits by roles only; {split!r} was asked for.",
+            f"Protocol {protocol!r} splits by roles only; {split!r} was given.",
             hint=f"Give --protocol with another of: {', '.join(task.protocols)}.",
         )
     return ways
 
 
 def serves(protocol: str, split: str | None) -> bool:
-    """Return whether a protocol goes together with a split."""
+    """Return whether a protocol is compatible with a split."""
     return split in (None, "roles") or not protocol_called(protocol).roles_only
 
 
 def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
-    """Return the splits that are asked for: ``few-shot`` stands for all of a task's ``few-shot-N``."""
+    """Return the splits that a name stands for: ``few-shot`` for all of a task's ``few-shot-N``."""
     few = tuple(name for name in task.splits if shots(name))
     return few if split == "few-shot" and few else (split,)
 

@@ -1,4 +1,4 @@
-"""Where the recordings of cells come from: made by a rig on request, or there already. Nothing is recorded yet."""
+"""Plan of the recordings of cells: those that exist, and those that a rig has to make."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ if TYPE_CHECKING:
     from tactbench.core.recording.datasets import DataSet
 
 RequestKey = tuple[str, str, str | None, int]
-"""Sensor, task, split and seed: what decides which recordings a cell needs."""
+"""Sensor, task, split and seed, which determine the recordings of a cell."""
 
 
 def request_key(cell: Cell) -> RequestKey:
-    """Return what recordings a cell needs; those of a split that its protocol cannot serve are never made."""
+    """Return the key of a cell's recordings, without a split that its protocol does not support."""
     return cell.sensor, cell.task, cell.split if serves(cell.protocol, cell.split) else None, cell.seed
 
 
 def requests_for(
     cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, rig_file: RigFile | None = None
 ) -> dict[RequestKey, list[RecordingRequest]]:
-    """Return the recordings needed, in the campaign's order, carried out as the cells ask a simulation.
+    """Return the recordings needed, in the campaign's order, with the cells' settings of the simulation.
 
     Where the campaign leaves the order to be drawn, it is drawn with the cell's seed.
-    Tasks and campaigns that ask for the same scene in the same role share the recording.
+    Tasks and campaigns with the same scene in the same role share the recording.
     """
     requests: dict[RequestKey, list[RecordingRequest]] = {}
     for cell in cells:
@@ -68,7 +68,7 @@ def requests_for(
 
 
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
-"""Splits that every recording acquired by a rig can be asked for; its scene's labels are further ones."""
+"""Splits that every acquired recording supports, beside the labels of its scene."""
 
 
 @dataclass
@@ -76,11 +76,11 @@ class RecordingSource:
     """Where the recordings of some cells come from."""
 
     paths: Sequence[Path]
-    """Where they lie, or will lie."""
+    """Paths of the recordings, present or to be made."""
     requests: Sequence[RecordingRequest] = ()
-    """What a rig has to record."""
+    """Requests to a rig for those that are missing."""
     trouble: BaseException | None = None
-    """Why there are no recordings, or not all of them."""
+    """Error that explains why recordings are missing."""
 
 
 RecordingPlan = dict[RequestKey, RecordingSource]
@@ -88,25 +88,25 @@ RecordingPlan = dict[RequestKey, RecordingSource]
 
 @dataclass(frozen=True)
 class Part:
-    """The tasks of a matrix that are asked of one place of recordings."""
+    """The tasks of a matrix that are evaluated on one folder of recordings."""
 
     matrix: MatrixSpec
     recordings: Path | None
     trouble: TactbenchError | None = None
-    """Why the data set is not there"""
+    """Error of a data set that could not be fetched or imported."""
     declared: tuple[DeclaredTask, ...] = ()
-    """Tasks that it would have brought"""
+    """Tasks that such a data set declares."""
 
 
 def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress) -> list[Part]:
     """Return `matrix` in parts, one for each data set that its tasks name; what is missing is fetched and imported.
 
-    A data set that cannot be had costs its own cells only.
+    A data set that cannot be fetched fails its own cells only.
 
     Raises
     ------
     TactbenchError
-        If that is so of all of them.
+        If no data set can be fetched.
     UnknownNameError
         If there is no data set of that name.
     """
@@ -144,7 +144,7 @@ def plan_parts(
     Raises
     ------
     UsageError
-        If two parts ask one sensor the same question, beside what `plan_run` raises.
+        If two parts have a cell in common, and as `plan_run`.
     """
     cells: dict[str, Cell] = {}
     plan: RecordingPlan = {}
@@ -157,7 +157,7 @@ def plan_parts(
         for cell in some:
             if cells.setdefault(cell.name, cell) is not cell:
                 raise UsageError(
-                    f"{cell.name} is asked of two places of recordings.",
+                    f"{cell.name} is planned for two folders of recordings.",
                     hint="Run one of them at a time, each with --out.",
                 )
         plan |= own
@@ -172,7 +172,7 @@ def plan_run(
     Raises
     ------
     UsageError
-        If the matrix asks for something that is not there.
+        If the matrix names something that does not exist.
     TactbenchError
         If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
@@ -235,9 +235,9 @@ def _from_replay(
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of recordings that exist.
 
-    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; one whose scene
-    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of the sensor that its
-    folder is named after; RecordingError if there is none.
+    A recording of a planned scene serves the campaigns with a scene of this name; one without (an imported table)
+    serves every task. An unreadable recording fails the cells of the sensor after which its folder is named;
+    RecordingError if there is no such sensor.
     """
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
@@ -275,7 +275,7 @@ def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:
 
 
 def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: RigFile | None) -> list[Path] | None:
-    """Return the recordings of a rig that replays, None of one that records."""
+    """Return the recordings of a rig that replays, or None for a rig that records."""
     rig = rig_of(name, registry, recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None
@@ -284,7 +284,7 @@ def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: 
 
 
 def _check_split(task: TaskSpec, split: str | None) -> None:
-    """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
+    """Refuse a split that the recordings of this task's scenes do not support, before any is made."""
     labels = {label for planned in task.scenes for label in planned.scene.labels}
     known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels}
     if split is not None and split not in known and shots(split) is None:

@@ -1,4 +1,4 @@
-"""Making recordings, in whatever process carries that out."""
+"""Acquisition of requested recordings."""
 
 from __future__ import annotations
 
@@ -11,24 +11,16 @@ from tactbench.core.plugins.registry import Family, Registry
 from tactbench.core.plugins.rigs import rig_of, taking_part
 
 GRACE_S = 5.0
-"""Seconds that a real rig has to stand still and close its devices when its time is up."""
+"""Seconds for a real rig to stop and close its devices after a timeout."""
 
 
 class Recorder:
-    """Makes one recording after the other; the rig, the same of all of them, is built once.
-
-    Parameters
-    ----------
-    registry
-        What the rig is built from.
-    operator
-        Who stands at a rig of real devices.
-    """
+    """Makes recordings one after the other; their rig, from `registry`, is built once."""
 
     def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator
         self._built: Any = None
-        self._registry = replace(registry, tasks=Family("task"))  # most of what a process would be sent
+        self._registry = replace(registry, tasks=Family("task"))  # tasks would be most of the pickled data
 
     def __call__(self, request: RecordingRequest) -> None:
         """Make a recording; raises whatever the rig raises."""
@@ -36,7 +28,7 @@ class Recorder:
 
         if self._built is None:
             self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
-        # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
+        # The cost of a simulation is processor time, since several run at once; that of a real rig is wall time.
         acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
 
 
@@ -49,7 +41,7 @@ def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[s
 
 
 def is_computed(request: RecordingRequest) -> bool:
-    """Return whether a scene needs nothing but this machine, and no wall clock."""
+    """Return whether a recording is computed on this machine, without real devices and wall-clock time."""
     simulated, devices = request.rig.simulated, request.rig_file
     if simulated or devices is None:
         return simulated

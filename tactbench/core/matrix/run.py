@@ -1,4 +1,4 @@
-"""A run: plan, record, evaluate, store; then the rows, in the order of the plan."""
+"""A run of a matrix: plan, record, evaluate and store its cells."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ EngineName = Literal["in-process", "isolated", "dask"]
 
 @dataclass(frozen=True)
 class EngineChoice:
-    """How the work is carried out."""
+    """Choice of the engine, with its number of processes and its limits."""
 
     name: EngineName = "isolated"
     jobs: int | None = None
@@ -66,7 +66,7 @@ class EngineChoice:
             )
 
     def engine(self, jobs: int) -> Engine:
-        """Return what carries out cells, `jobs` at once on this machine."""
+        """Return the engine for cells, `jobs` of them at once on this machine."""
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
 
@@ -74,7 +74,7 @@ class EngineChoice:
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
     def recorder(self, *, computed: bool) -> Engine:
-        """Return what makes recordings on this machine: those of devices one at a time, with time to be closed."""
+        """Return the engine for recordings; those of devices are made one at a time, with time to close the devices."""
         if self.name == "in-process":
             return InProcess()
         return Pool(self.processes, self.limits) if computed else Pool(1, replace(self.limits, grace_s=GRACE_S))
@@ -82,18 +82,18 @@ class EngineChoice:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run leaves behind."""
+    """Result of a run."""
 
     rows: tuple[Row, ...]
     provenance: dict[str, Any]
     computed: int
-    """Cells computed now; the others were found finished."""
+    """Number of cells computed in this run; the others were reused."""
     recorded: int
-    """Recordings made now."""
+    """Number of recordings made in this run."""
 
     @property
     def failures(self) -> list[Row]:
-        """The rows of cells that should have ended otherwise."""
+        """Rows of cells that failed."""
         return [row for row in self.rows if row["status"] in STOPPED]
 
 
@@ -107,32 +107,32 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Record and evaluate `matrix`, reusing what `store` already has.
+    """Record and evaluate `matrix`, reusing finished results in `store`.
 
     Parameters
     ----------
     matrix
-        What to run.
+        The matrix.
     store
-        Where results lie.
+        Result folder.
     choice
-        Where the work is done, how much of it at once and within which limits; scores do not depend on it.
+        Engine, number of processes and limits; scores do not depend on it.
     recordings
         Folder for rigs that replay.
     root
         Folder of a copy of the data sets that `matrix` names; see
         :meth:`~tactbench.core.recording.datasets.DataSet.recordings`.
     operator
-        Who mounts caps and presses, at a rig of real devices.
+        Operator of a rig of real devices.
     progress
-        Receives what happens.
+        Display of the progress.
 
     Raises
     ------
     UsageError
-        If the matrix asks for something that is not there. Nothing has been run then.
+        If the matrix names something that does not exist; nothing is run.
     FolderError
-        If another run holds the folder, or the disk refuses; what was finished before is kept.
+        If another run holds the folder, or it cannot be written; finished cells are kept.
     """
     choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
@@ -156,7 +156,7 @@ def run_matrix(
 
 @dataclass
 class Run:
-    """What one run works with, and the rows so far."""
+    """State of a run: its settings, and the rows so far."""
 
     store: Store
     registry: Registry
@@ -171,7 +171,7 @@ class Run:
     recorded: int = 0
 
     def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
-        """Record what `cells` lack, then evaluate them; `alone`: one cell at a time, with nothing else at work."""
+        """Make the missing recordings of `cells`, then evaluate them; `alone`: one cell at a time."""
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
@@ -189,7 +189,7 @@ class Run:
     # Recordings
 
     def _record(self, requests: Sequence[RecordingRequest]) -> None:
-        """Make what is not there yet."""
+        """Make the recordings that do not exist yet."""
         self._clear(requests)
         missing = {request.path: request for request in requests if not self._is_there(request)}
         if not missing:
@@ -207,7 +207,7 @@ class Run:
             self._clear(missing.values())  # of an interrupted run, too
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
-        """Remove what a simulation that was killed has left; what devices gave is never removed."""
+        """Remove unfinished files of killed simulations; data of devices are never removed."""
         by_path = {request.path: request for request in requests}
         for folder in {path.parent for path in by_path}:
             for left in folder.glob("*.h5.*"):
@@ -216,7 +216,7 @@ class Run:
                     left.unlink(missing_ok=True)
 
     def _is_there(self, request: RecordingRequest) -> bool:
-        """Return whether a recording need not be made; one of a simulation that is damaged is removed."""
+        """Return whether a recording exists; a damaged one of a simulation is removed."""
         if request.path.exists() and is_computed(request):
             try:
                 self.store.about(request.path)
@@ -256,7 +256,7 @@ class Run:
     # Cells
 
     def _jobs(self, source: RecordingSource, cells: Iterable[Cell]) -> list[Job]:
-        """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
+        """Return jobs for those of `cells`, which share recordings, that are not finished; the others get their row."""
         jobs = []
         digests: dict[Path, str] = {}
         for cell in cells:
@@ -293,7 +293,7 @@ class Run:
                 engine.submit(work, piece)
 
     def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
-        """Keep what came of a cell."""
+        """Store the result or the error of a cell."""
         cell = job.cell
         if isinstance(outcome, BaseException):
             self._stopped(cell, job.task, outcome, job.key, job.sections)

@@ -1,4 +1,4 @@
-"""One cell: from a job to its row, in whatever process carries it out."""
+"""Evaluation of one cell: from a job to its row."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ _TIMES = ("search_s", "fit_s", "predict_s")
 
 
 class Job(NamedTuple):
-    """A cell to be evaluated, with all that its process has to know."""
+    """A cell to be evaluated, with all the data that its process needs."""
 
     cell: Cell
     task: TaskSpec
     estimator: EstimatorDescriptor
     recordings: tuple[Path, ...]
     digests: tuple[str, ...]
-    """Of the recordings' content."""
+    """Digests of the recordings' content."""
     key: str
     sections: Sections
-    """What the key is made of."""
+    """Sections of the key."""
 
 
 def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
     """Import what an estimator needs and fit it to a few made-up rows, so that no clock counts a first use.
 
-    What is wrong with the estimator is left to its cells.
+    Errors are ignored here; the estimator's cells report them.
     """
     if (os.getpid(), estimator.name, kind) in _prepared:
         return
@@ -67,19 +67,19 @@ _prepared: set[tuple[int, str, str]] = set()
 
 
 def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplete: bool = False) -> Dataset:
-    """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
+    """Return the dataset of a task from `recordings`; the last one is kept for the next cell."""
     from tactbench.core.evaluation.dataset import load_dataset
 
     states = [(one.st_ino, one.st_mtime_ns, one.st_size) for one in map(os.stat, filter(os.path.exists, recordings))]
-    asked = [task, recordings, states, include_incomplete]
-    if _last[:4] != asked:
-        _last[:] = [*asked, load_dataset(task, recordings, include_incomplete=include_incomplete)]
+    wanted = [task, recordings, states, include_incomplete]
+    if _last[:4] != wanted:
+        _last[:] = [*wanted, load_dataset(task, recordings, include_incomplete=include_incomplete)]
     found: Dataset = _last[4]
     return found
 
 
 _last: list[Any] = []
-"""What was read last: task, recordings, the state of their files, whether incomplete ones take part, and the rows."""
+"""The last dataset, after what it was made of: task, recordings, states of their files, and `include_incomplete`."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]
@@ -92,9 +92,9 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
     Parameters
     ----------
     concurrency
-        Pieces of work of the run that may be at work beside this one, itself included.
+        Number of pieces of work that the run carries out at the same time.
     own
-        Fields of :class:`CellContext` that a caller in Python gives in place of what the job names.
+        Fields of :class:`CellContext` that replace those of the job, for a caller in Python.
     """
     cell, task, estimator, recordings, *_ = job
     if not own or own["given"] is None:
@@ -112,8 +112,8 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = read_dataset(task, recordings, cell.include_incomplete)
-    asked: dict[str, Any] = {"split": cell.split, "seed": cell.seed, "latency": cell.timed, **(own or {})}
-    context = CellContext(task, estimator, dict(cell.params), cell.protocol, clock=time.perf_counter, **asked)
+    settings: dict[str, Any] = {"split": cell.split, "seed": cell.seed, "latency": cell.timed, **(own or {})}
+    context = CellContext(task, estimator, dict(cell.params), cell.protocol, clock=time.perf_counter, **settings)
     result = evaluate_cell(context, data)
     row = {
         **opening(cell, task),
@@ -134,7 +134,7 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
 
 
 def check_content(job: Job) -> None:
-    """Raise EngineError if this process sees other recordings than the run does."""
+    """Raise EngineError if recordings in this process differ from those of the run."""
     from tactbench.core.recording.reader import content_digest
 
     for path, digest in zip(job.recordings, job.digests, strict=True):
@@ -146,13 +146,13 @@ def check_content(job: Job) -> None:
 
 
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
-    """Return a row with what is known before anything is computed; every key of the format is there."""
+    """Return a row with every key of the format, filled with what is known before the evaluation."""
     unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
-    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence")
+    of_task = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **unknown,
         **{name: getattr(cell, name) for name in ALIKE},
-        **{name: getattr(task, name) for name in asked},
+        **{name: getattr(task, name) for name in of_task},
         "cell": cell.name,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
@@ -164,7 +164,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
 
 
 def published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
-    """Return the published figure that the cell may stand beside: one of ours with its defaults only."""
+    """Return the published figure to compare the cell with; estimators of other names need their default parameters."""
     found = task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
     if found is None or (cell.baseline if found.estimator is None else cell.params):
         return {"published": None, "published_reference": "", "published_remark": ""}
@@ -186,7 +186,7 @@ def unanswered(cell: Cell, task: TaskSpec, why: BaseException, *, simulated: boo
 
 
 def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
-    """Return what recordings say that a reader of the row must know."""
+    """Return the keys of a row that describe its recordings."""
     seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
     return {
         "simulated": any(meta.simulated for meta in metas),
@@ -199,7 +199,7 @@ def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
 
 
 def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
-    """Return what a simulation assumed in all recordings; of what differs among them, the range or every value."""
+    """Return the assumptions of simulated recordings; where they differ, the range or all values."""
     found: dict[str, Scalar] = {}
     for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
         values = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))

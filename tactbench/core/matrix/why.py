@@ -1,4 +1,4 @@
-"""One cell of a result folder: why it would be reused or computed, and the same once more, bit for bit."""
+"""One cell of a result folder: whether a run would reuse it, and its recomputation, bit for bit."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.progress import Progress
 
 _SHOWN = 8
-"""Cells named in a message."""
+"""Number of cells that a message lists."""
 
 
 @dataclass(frozen=True)
 class StoredCell:
-    """A cell, the row that answers it, and the recordings that it needs, whether they are there or not."""
+    """A stored cell with its row and the paths of its recordings, whether these exist or not."""
 
     store: Store
     registry: Registry
@@ -33,9 +33,9 @@ class StoredCell:
     paths: list[Path]
 
     def changes(self) -> tuple[str, list[str]]:
-        """Return its key, and what it would not be reused for, in words; no key: not before its recordings are there.
+        """Return the present key of the cell, and sentences that explain why it would not be reused.
 
-        What differs from the result that is there comes first, then what is missing.
+        The key is empty while recordings are missing. Differences from the stored result come before missing files.
         """
         missing = [path for path in self.paths if not path.exists()]
         reasons = [] if self.paths else ["there are no recordings of it"]
@@ -55,10 +55,10 @@ class StoredCell:
         return key, [*(differences(before, now) if before else []), *reasons]
 
     def again(self, progress: Progress) -> tuple[Row, list[str], int]:
-        """Compute it once more in this process; nothing in the result folder changes.
+        """Recompute the cell in this process, without changing the result folder.
 
-        Return the row, what is not as it was, in words, and how many recordings were made anew, into another place: all
-        that a simulation made.
+        Return the row, sentences about differences from the stored one, and the number of simulated recordings that
+        were made again in a temporary folder.
         """
         with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
             keys, need = Keys(self.registry), request_key(self.cell)
@@ -97,22 +97,17 @@ def stored_cell(store: Store, given: str) -> StoredCell:
 
 
 def meant(given: str, names: Sequence[str]) -> str:
-    """Return the name of the cell that `given` stands for: its name, a part of only one name, or some of its parts.
+    """Return the one of `names` that `given` stands for: the name, a part of only one name, or some of its parts.
 
     ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
 
     The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
     part, stands for the first of them.
 
-    Parameters
-    ----------
-    names
-        Of the cells there are.
-
     Raises
     ------
     UsageError
-        If several cells are meant (the message lists them), or none.
+        If `given` stands for several cells, which the message lists, or for none.
     """
     if given in names:
         return given
@@ -136,12 +131,12 @@ def meant(given: str, names: Sequence[str]) -> str:
 
 
 def _is_short(given: str, name: str) -> bool:
-    """Return whether the parts of `given` are parts of a name, in their order."""
+    """Return whether the parts of `given` occur in a name, in the same order."""
     parts = iter(name.split("/"))
     return all(one in parts for one in given.split("/"))
 
 
 def _parts(name: str) -> tuple[str, int]:
-    """Return what the replicates of a cell have in common, and which one this is."""
+    """Return the part of a name that all replicates of a cell share, and the number of the replicate."""
     cell, _, seed = name.rpartition("/")
     return (cell, int(seed)) if seed.isdecimal() else (name, 0)

@@ -1,4 +1,4 @@
-"""The child process's side: it carries out the items of one piece of work, one after the other."""
+"""The child process of the pool, which carries out the items of one piece of work in order."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def run_child(
     folder: str,
     limits: Limits,
 ) -> None:
-    """Carry out `work` for each item; send what begins and what comes of it through `connection`.
+    """Carry out `work` for each item; send the beginning and the result of each through `connection`.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def run_child(
 
 
 def end_of(log: int) -> str:
-    """Return the end of what the item at work has printed, from the descriptor of a log."""
+    """Return the end of the present item's output from the descriptor of its log."""
     os.lseek(log, max(0, os.fstat(log).st_size - LOG_BYTES), os.SEEK_SET)
     return os.read(log, LOG_BYTES).decode(errors="replace")
 
 
 def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:
-    """Return what came of an item."""
+    """Return the kind of outcome, "value" or "error", and the outcome of an item."""
     if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
         faulthandler.dump_traceback_later(limits.timeout_s)
     try:

@@ -1,4 +1,4 @@
-"""How much time and memory an item of work may take, and how that is measured."""
+"""Limits on time and memory of an item of work, and the measurement of memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import psutil
 
 @dataclass(frozen=True)
 class Limits:
-    """What one item, a cell or a recording, may take; None: no limit."""
+    """Limits of one item, a cell or a recording; None means no limit."""
 
     timeout_s: float | None = None
     """Seconds of wall time."""

@@ -1,4 +1,4 @@
-"""The parent's side of the process pool."""
+"""The process pool, in the parent process."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ MOST_LOG_BYTES = 2**24
 
 
 class Engine:
-    """Carries out pieces of work, each a sequence of items; as a context it drops what has not begun at the end."""
+    """Carries out pieces of work, each a sequence of items; at the end of its context, waiting pieces are dropped."""
 
     log = ""
-    """What the item had printed whose outcome was yielded last, the end of it."""
+    """End of the output of the item whose outcome was yielded last."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
@@ -102,7 +102,7 @@ class Pool(Engine):
         super().__init__()
         self.jobs, self.limits = jobs, limits
         self._ended: SimpleQueue[tuple[Any, Any, str] | None] = SimpleQueue()
-        """Item, outcome and log; None: a piece is through."""
+        """Item, outcome and log; None marks the end of a piece."""
         self._threads: list[threading.Thread] = []
         self._abandoned = threading.Event()
 
@@ -157,11 +157,11 @@ _starting = threading.Lock()
 
 
 class _Child:
-    """A child process with its items."""
+    """A child process that carries out items."""
 
     def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
         self.over = False
-        """Whether the process is of no more use."""
+        """Whether the process has ended."""
         self._limits = limits
         context = _context()
         self._connection, theirs = context.Pipe()
@@ -177,7 +177,7 @@ class _Child:
             theirs.close()
 
     def outcome(self, abandoned: threading.Event) -> tuple[Any, str] | None:
-        """Return what came of the next item, or stopped it, and what it printed; None: nobody waits for it."""
+        """Return the result or error of the next item and its log, or None if the pool is being closed."""
         began_s, shared_mb = time.monotonic(), None
         while not abandoned.is_set():
             try:
@@ -186,7 +186,7 @@ class _Child:
                     if kind == "begun":
                         began_s, shared_mb = time.monotonic(), value
                         continue
-                    return _told(value, log, began_s)
+                    return _with_log(value, log, began_s)
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
             except (EOFError, OSError):  # it has ended, or closed what is not its own
                 self._process.join(1.0)
@@ -194,11 +194,11 @@ class _Child:
             if stopped is not None:
                 self._kill(unfinished=True)
                 self.over = True
-                return _told(stopped, end_of(self._log), began_s)
+                return _with_log(stopped, end_of(self._log), began_s)
         return None
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
-        """Return why the item at work must be ended; None if it need not."""
+        """Return the error of an item that exceeds its limits, or None."""
         if os.fstat(self._log).st_size > MOST_LOG_BYTES:
             os.ftruncate(self._log, 0)
         timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
@@ -224,7 +224,7 @@ class _Child:
         return Crashed(f"Its process was ended by signal {-code} ({name}).", hint=hint, signal=-code)
 
     def end(self, *, unfinished: bool) -> None:
-        """End the process and its group; if `unfinished`, after the time that it has to close its devices."""
+        """End the process and its group; if `unfinished`, after the grace time in which it can close its devices."""
         if not self.over:
             self._kill(unfinished=unfinished)
         self._close()
@@ -250,8 +250,8 @@ class _Child:
         self._process.join()
 
 
-def _told(value: Any, log: str, began_s: float) -> tuple[Any, str]:
-    """Return an outcome and its log; an error also gets them, with the stacks that Python's fault handler wrote."""
+def _with_log(value: Any, log: str, began_s: float) -> tuple[Any, str]:
+    """Return an outcome and its log; an error also carries the log and the stacks that Python's fault handler wrote."""
     if isinstance(value, CellStopped):
         value.log, value.spent_s = log, time.monotonic() - began_s
         marks = [mark for mark in ("Fatal Python error", "Timeout (") if mark in log]
@@ -277,7 +277,7 @@ def preload(*modules: str) -> None:
 
 
 def _start(start: Callable[[], None]) -> None:
-    """Start a process while the main module is hidden, which it would import anew: a script need not guard it."""
+    """Start a process without importing the main module in it: a script needs no ``__main__`` guard."""
     main = sys.modules["__main__"]
     with _starting:
         hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}

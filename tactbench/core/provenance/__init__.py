@@ -1,1 +1,1 @@
-"""What made a result: source, versions, machine."""
+"""Provenance of results: source, versions, machine."""

@@ -1,4 +1,4 @@
-"""Which software computed a result on which machine: gathered once a run, and said in a few sentences under a table.
+"""Provenance: the software and machine of a run, gathered once and summarised below a table.
 
 It holds no clock, no name of a person or host and no path: equal circumstances give equal provenance.
 """
@@ -52,7 +52,7 @@ def usable_cores() -> int:
 
 @lru_cache(maxsize=1)
 def host_id() -> str:
-    """Return a digest that tells hosts apart without naming them."""
+    """Return a digest that identifies the host without naming it."""
     parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
 
@@ -68,7 +68,7 @@ def cpu_model() -> str:
 
 
 def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
-    """Yield the package of each plugin that is not ours: who brought it, its version, its source."""
+    """Yield distribution, version, package and source digest of each third-party plugin."""
     packages = {row.module.partition(".")[0]: row for row in registry.plugins}
     for package, row in sorted(packages.items()):
         if package != PACKAGE:
@@ -78,16 +78,16 @@ def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
 
 def _commit(folder: Path) -> str:
     """Return the commit of the git checkout that holds `folder`, with ``+changes`` if files below it differ from it."""
-    asked = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
+    command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
     try:
-        found = subprocess.run(asked, capture_output=True, text=True, timeout=GIT_S, check=True)
+        found = subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=True)
     except (OSError, subprocess.SubprocessError):
         return ""
     return found.stdout.strip()
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return which software made some rows on which machines, each said once; an empty one is passed over."""
+    """Return sentences about software and machines of several provenances, each once; empty ones are skipped."""
     return tuple(dict.fromkeys(text for one in filter(None, several) for text in _sentences(one)))
 
 

@@ -1,4 +1,4 @@
-"""Digests of source code: what a key says of the packages that take part in a recording or an answer."""
+"""Digests of the source code of packages that take part in a recording or an answer."""
 
 from __future__ import annotations
 
@@ -85,17 +85,17 @@ def version_of(distribution: str) -> str:
 
 
 def provenance_id(provenance: Mapping[str, Any]) -> str:
-    """Return what rows call a provenance by."""
+    """Return the identifier of a provenance in rows."""
     return digest_of(json.dumps(provenance, sort_keys=True))[:16]
 
 
 def digest_of(text: str) -> str:
-    """Return the digest that a key or an identifier is: 32 hexadecimal digits."""
+    """Return the digest of a text for a key or an identifier: 32 hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def identity_of(value: Any) -> dict[str, Any]:
-    """Return what the answers of an object depend on: a digest of its attributes, versions and sources of its classes.
+    """Return the digest of an object's attributes, with versions and sources of the code that it uses.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def identity_of(value: Any) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If that cannot be told: of lambdas, of what is defined in a notebook or within a function.
+        If the source cannot be determined: of lambdas, and of objects defined in a notebook or a function.
     """
     import joblib
 
@@ -129,5 +129,5 @@ def identity_of(value: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _distributions() -> Mapping[str, list[str]]:
-    """Return what distributions brought each package that can be imported."""
+    """Return the distributions that provide each importable package."""
     return importlib.metadata.packages_distributions()

@@ -46,10 +46,29 @@ def tactbench_effects() -> list[EffectDescriptor]:
             ("skin", "gain", "effective-force", "vibration", "shear", "slip"),
             ("taxel", "reading"),
         ),
-        _heat("contact-heat", "Heat through the contact", ("skin",), ("warmth",)),
-        _heat("dc-temperature", "Temperature of the core", ("warmth",), ("dc_temperature", "reading")),
-        _heat("ac-temperature", "Rate of the core's temperature", ("warmth",), ("ac_temperature", "reading")),
-        _heat("thermal-drift", "Drift with the fluid's temperature", ("warmth", "taxel"), ("disturbance",), ("heat",)),
+        _effect("contact-heat", "Heat through the contact", "effects.heat:contact_heat", ("skin",), ("warmth",)),
+        _effect(
+            "dc-temperature",
+            "Temperature of the core",
+            "effects.heat:dc_temperature",
+            ("warmth",),
+            ("dc_temperature", "reading"),
+        ),
+        _effect(
+            "ac-temperature",
+            "Rate of the core's temperature",
+            "effects.heat:ac_temperature",
+            ("warmth",),
+            ("ac_temperature", "reading"),
+        ),
+        _effect(
+            "thermal-drift",
+            "Drift with the fluid's temperature",
+            "effects.heat:thermal_drift",
+            ("warmth", "taxel"),
+            ("disturbance",),
+            ("heat",),
+        ),
         _channels("rest-spread", "Scatter of rest levels"),
         _channels("unit-rest", "Rest levels of another unit"),
         _channels("offset", "Offsets", groups=_DRIFT),
@@ -93,7 +112,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
 
 @hookimpl
 def tactbench_indenters() -> list[IndenterDescriptor]:
-    """Offer the usual shapes. A cap and a flat surface stand in a scene as a radius or none."""
+    """Offer the usual shapes; scenes store a cap or a flat surface as a radius or its absence."""
     radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
     return [
         _indenter("cap", "Spherical cap", radius=radius),
@@ -148,9 +167,3 @@ def _channels(
     groups: tuple[str, ...] = (),
 ) -> EffectDescriptor:
     return _effect(name, title, f"effects.channels:{name.replace('-', '_')}", consumes, produces, groups)
-
-
-def _heat(
-    name: str, title: str, consumes: tuple[str, ...], produces: tuple[str, ...], groups: tuple[str, ...] = ()
-) -> EffectDescriptor:
-    return _effect(name, title, f"effects.heat:{name.replace('-', '_')}", consumes, produces, groups)

@@ -1,4 +1,4 @@
-"""How finely the twin resolves a contact: what is paid for accuracy, in one place."""
+"""Settings that trade the accuracy of a simulated contact for computing time."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tactbench.plugin.simulation import SkinSheet
 
 @dataclass(frozen=True)
 class Fidelity:
-    """One point between quick and exact; two of them differ in error alone, not in the model."""
+    """A set of accuracy settings; they change the error of the solution, not the model."""
 
     solver: Literal["newton", "local"] = "newton"
-    """What solves a load: the energy's minimiser with everything in it, or each cell on its own."""
+    """Solver of a load: the minimiser of the whole energy, or each cell by itself."""
     cells_factor: float = 1.0
     """Cells of the skin along each axis, relative to those of the sensor's SkinSheet."""
     conduction_refinement: int = 2
-    """Cells of a finer grid per cell of the skin and axis, for transducers that have such a grid."""
+    """Cells per cell of the skin and axis in a transducer's own finer grid."""
     newton_tolerance: float = 1e-6
     """Largest relative residual of the contact solver."""
     most_nodes: int = 14
-    """Loads after which a load table is refined no further."""
+    """Limit on the loads of a load table."""
     table_tolerance_factor: float = 6.0
     """Wanted bound of a load table's error, in units of what noise and rounding hide anyway.
 
@@ -50,7 +50,7 @@ class Fidelity:
 
 
 DEFAULT = Fidelity()
-"""What every recording is made with."""
+"""Settings of every recording without settings of its own."""
 FINE = Fidelity(
     cells_factor=3.0,
     conduction_refinement=2,
@@ -58,7 +58,7 @@ FINE = Fidelity(
     most_nodes=64,
     table_tolerance_factor=0.1,
 )
-"""For measuring the error of the others: a hundred times the cost."""
+"""Reference for measuring the error of the others, at a hundred times the cost."""
 
 RUNGS: dict[str, Fidelity] = {
     "closed-form": dataclasses.replace(DEFAULT, solver="local"),

@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, Indenter, RigError
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
@@ -23,7 +22,7 @@ _FEWEST_CELLS = 4
 
 @dataclass(frozen=True)
 class Contact:
-    """Where and with what the skin is pressed."""
+    """Place and shape of the contact of an indenter."""
 
     radius_mm: float
     """Radius of the cap; infinite for a flat surface and for another shape."""
@@ -36,7 +35,7 @@ class Contact:
     tilt_s: float = 0.0
     """Slope of the indenter across the finger [1]."""
     shape: Shape | None = None
-    """What is neither flat nor a cap."""
+    """Shape of an indenter that is neither flat nor a cap."""
 
 
 def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
@@ -52,7 +51,7 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     Raises
     ------
     RigError
-        If the sheet has no area, its radius is none, or it has fewer than four cells either way.
+        If the sheet has no area or no positive radius, or fewer than four cells either way.
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
@@ -69,17 +68,6 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     return SkinGrid(x_mm=x, s_mm=s)
 
 
-def pad_of(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_] | None:
-    """Return which (nx, ns) cells belong to the active part; None where the whole sheet does."""
-    if sheet.pad is None:
-        return None
-    low, high, arc = (edge.to("mm") for edge in sheet.pad)
-    inside: npt.NDArray[np.bool_] = ((grid.x_mm >= low) & (grid.x_mm <= high))[:, None] & (
-        np.abs(grid.s_mm) <= arc / 2
-    )[None, :]
-    return inside
-
-
 def outer_radius_mm(sheet: SkinSheet) -> float:
     """Return the radius of the finger's outer surface; infinite for a flat pad."""
     return math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
@@ -88,6 +76,11 @@ def outer_radius_mm(sheet: SkinSheet) -> float:
 def radius_mm(indenter: Indenter) -> float:
     """Return the cap's radius; infinite for a flat surface and for another shape."""
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
+
+
+def surface_of(sheet: SkinSheet) -> tuple[float, Dome | None, SheetTable | None]:
+    """Return outer radius [mm], dome and relief of a sheet: the finger's surface as :func:`gap_mm` takes it."""
+    return outer_radius_mm(sheet), sheet.dome, sheet.relief
 
 
 def gap_mm(
@@ -152,17 +145,6 @@ def around_mm(
     )
 
 
-def finger_surface_mm(
-    grid: SkinGrid, outer_radius_mm: float, dome: Dome | None = None, relief: SheetTable | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the (nx, ns) places of the cells on the unloaded finger: axial, across, and height (the pad is below)."""
-    theta = grid.s_mm[None, :] / outer_radius_mm
-    phi, axial = _meridian(grid.x_mm[:, None], outer_radius_mm, dome)
-    inside = 0.0 if relief is None else relief.at(grid.x_mm, grid.s_mm / outer_radius_mm)
-    ring = (outer_radius_mm - inside) * np.cos(phi)
-    return axial - inside * np.sin(phi) + np.zeros_like(theta), ring * np.sin(theta), -ring * np.cos(theta)
-
-
 def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:
     """Return the meridian angle at `x_mm` and the axial place on the finger's surface: its own up to the dome's end."""
     if dome is None:
@@ -172,15 +154,13 @@ def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[Float
 
 
 def check_contact(grid: SkinGrid, contact: Contact) -> None:
-    """Refuse a contact the grid cannot resolve or that misses the skin.
+    """Refuse a contact that the grid cannot resolve or that misses the skin.
 
     Raises
     ------
     RigError
-        If the cap's radius is below a cell, where a contact would live in one cell and follow the mesh and not the
-        physics; if another shape has risen by more than a cell at a cell from its axis (which says the same of a cap);
-        if it is tilted by more than 45 degrees; or if its apex is off the sheet, where the periodic sheet would answer
-        for the wrong side.
+        If the cap's radius is smaller than a cell, or another shape rises by more than a cell within a cell of its
+        axis; if it is tilted by more than 45 degrees; or if its apex is off the sheet.
     """
     dx, ds = grid.cell_mm
     if not contact.radius_mm >= max(dx, ds):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import FloatArray
-from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, Skin
+from tactbench.plugin.simulation import FoamPad, Skin
 
 
 def shear_modulus_mpa(skin: Skin) -> float:
@@ -21,10 +21,8 @@ def shear_modulus_mpa(skin: Skin) -> float:
     """
     if isinstance(skin, FoamPad):
         return skin.shear.to("MPa") / 2.0
-    if isinstance(skin, FluidBackedShell | BondedLayer):
-        poisson = skin.poisson.to("1")
-        return skin.young.to("MPa") / (2.0 * (1.0 + poisson)) / (2.0 - poisson)
-    raise TypeError(f"no shear modulus is known for {type(skin).__name__}")
+    poisson = skin.poisson.to("1")
+    return skin.young.to("MPa") / (2.0 * (1.0 + poisson)) / (2.0 - poisson)
 
 
 def sliding_stiffness(contact_radius_mm: FloatArray, shear_mpa: float) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Which effects a scene gets, in which order, and why: the closure over what is observed.
+"""Planning: which effects a scene gets, in which order, and why.
 
-Effects name tokens they produce and consume. What is observed is needed; what produces something needed is
-included if its own predicate says that the scene calls for it, or if the scene asks for it by name; then everything it
-consumes is needed too. Nothing else is imported, allocated or stepped.
+Effects name the tokens that they produce and consume. Observed tokens are needed. An effect that produces a needed
+token is included if its predicate calls for it or the scene names it; then the tokens that it consumes are needed, too.
+No other effect is imported or applied.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from tactbench.plugin import (
     load_object,
 )
 from tactbench.plugin.simulation import EffectDescriptor, Reason
+from tactbench.rigs.twin.effects.called_for import NOT_OBSERVED
 from tactbench.rigs.twin.synthesis import Settled
 
 STORED = "stored"
-"""Token of what a recording always needs: stored samples."""
+"""Token of the stored samples, which every recording needs."""
 REFERENCE = "reference-force"
-"""Token of the other thing it always needs: the reference force."""
+"""Token of the reference force, which every recording needs."""
 LENT = "core"
-"""Token of effects that the contact solver calls upon by itself, if a load needs them."""
-UNNEEDED = "no observed channel depends on it"
+"""Token of effects that the contact solver applies by itself when a load needs them."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Plan:
     entries: tuple[PlanEntry, ...]
     """Included effects in their order, then those left out."""
     stages: tuple[EffectDescriptor, ...]
-    """What is applied, in order."""
+    """Effects to apply, in order."""
     lent: Mapping[str, str]
-    """What the solver may call upon: name -> ``module:callable``."""
+    """Effects that the solver may apply: name -> ``module:callable``."""
 
     def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
         """Return the entries with those that only the solve could decide replaced."""
@@ -63,19 +63,19 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
         If nothing observed is among the sensor's channels, or no included effect gives an observed kind.
     """
     kinds = _observed(scene, sensor)
-    asked = _asked(effects, scene)
-    reasons = _needed(effects, {*kinds, STORED, REFERENCE}, asked, scene, sensor)
+    signed = _signed(effects, scene)
+    reasons = _needed(effects, {*kinds, STORED, REFERENCE}, signed, scene, sensor)
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = reasons.get(effect.name, Reason(False, UNNEEDED, 0.0))
-        taken = asked.get(effect.name, reason.called_for)
+        reason = reasons.get(effect.name, Reason(False, NOT_OBSERVED, 0.0))
+        taken = signed.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
-        entries[effect.name] = _entry(effect, reason, taken, asked=effect.name in asked)
+        entries[effect.name] = _entry(effect, reason, taken, asked=effect.name in signed)
     for kind in kinds:
         if not any(kind in effect.produces for effect in included):
-            without = [name for name, taken in asked.items() if not taken]
+            without = [name for name, taken in signed.items() if not taken]
             raise NotApplicable(
                 f"The twin does not model {kind} of {sensor.name}: no installed effect produces it in this scene"
                 + (f" without {', '.join(without)}." if without else "."),
@@ -91,15 +91,15 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     )
 
 
-def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]:
-    """Return what the scene asks for with a sign: effect -> whether it is included; later words win.
+def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]:
+    """Return the effects that the scene names with a sign: effect -> whether it is included; later words win.
 
     Raises
     ------
     UsageError
         If a word is neither an effect, nor a group of them, nor ``all``.
     """
-    asked: dict[str, bool] = {}
+    signed: dict[str, bool] = {}
     for word in scene.simulation.effects:
         name = word.lstrip("+-")
         meant = [effect.name for effect in effects if name in (effect.name, *effect.groups, "all")]
@@ -110,10 +110,10 @@ def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]
                 hint=f"Effects: {', '.join(effect.name for effect in effects)}. Groups: {', '.join(groups)}.",
             )
         for found in meant:
-            asked.pop(found, None)
+            signed.pop(found, None)
             if word != name:
-                asked[found] = word.startswith("+")
-    return asked
+                signed[found] = word.startswith("+")
+    return signed
 
 
 def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reason:
@@ -147,24 +147,24 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 
 
 def _needed(
-    effects: Sequence[EffectDescriptor], tokens: set[str], asked: Mapping[str, bool], scene: Scene, sensor: SensorSpec
+    effects: Sequence[EffectDescriptor], tokens: set[str], signed: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
-    """Return what the effects say of themselves that could be needed: name -> reason.
+    """Return the reasons of the effects that could be needed, by name.
 
-    Only what is included needs what it consumes: an effect that the scene does not call for drags nothing along, and
-    what would be called for but is consumed by such effects alone is not.
+    Only what is included needs what it consumes: the inputs of an effect that is left out are not
+    included for its sake.
     """
-    begin = tokens.union(*(effect.produces for effect in effects if asked.get(effect.name)))
+    begin = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
     possible = _closure(effects, begin)
     reasons = {
         effect.name: _reason(effect, scene, sensor) for effect in effects if possible.intersection(effect.produces)
     }
     taking = [effect for effect in effects if effect.name in reasons]
-    taking = [effect for effect in taking if asked.get(effect.name, reasons[effect.name].called_for)]
+    taking = [effect for effect in taking if signed.get(effect.name, reasons[effect.name].called_for)]
     needed = _closure(taking, begin)
     for effect in taking:
         if not needed.intersection(effect.produces):
-            reasons[effect.name] = Reason(False, UNNEEDED, 0.0)
+            reasons[effect.name] = Reason(False, NOT_OBSERVED, 0.0)
     return reasons
 
 

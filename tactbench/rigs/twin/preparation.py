@@ -1,4 +1,4 @@
-"""From a scene to a recording in the making: its clocks, its load, its place; then its plan, carried out."""
+"""Preparation of a simulated recording (clocks, load, place of contact) and application of its plan."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 _OWN_CLOCK_FROM = 2.0
 """A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 MOST_SAMPLES = 20_000_000
-"""Samples of a stream that are still made: two and a half hours at 2200 Hz, 160 MB a channel and effect."""
+"""Limit on the samples of a stream: two and a half hours at 2200 Hz, 160 MB per channel and effect."""
 _NOT_BELOW_ZERO = ("scatter", "tilt_scatter", "start", "end", "hold", "duration", "since_power_on", "force_noise")
-"""Fields of a scene's parts for which less than zero means nothing."""
+"""Fields of a scene that must not be negative."""
 _LOOP = ("proportional", "integral", "delay", "motor_lag", "resolution")
-"""Those of a force loop."""
+"""Fields of a force loop that must not be negative."""
 _ABOVE_ZERO = ("force_filter", "cutoff", "rate", "speed", "acceleration")
-"""Fields that divide, or without which nothing moves."""
+"""Fields of a scene that must be positive."""
 
 
 def prepare(
@@ -51,12 +51,12 @@ def prepare(
     Raises
     ------
     RigError
-        If a number of the scene is none, its force profile or its clocks cannot be carried out, or its indenter is of
-        no installed shape.
+        If a number of the scene is not valid, its force profile or its clocks cannot be carried out, or its indenter
+        names no installed shape.
     UsageError
         If the shape has no such dimension.
     NotApplicable
-        If the sensor declares no skin, or no scenario of the name that the scene's simulation asks for.
+        If the sensor declares no skin, or no scenario of the name in the scene's simulation.
     """
     check_numbers(scene)
     sensor = handled(sensor, scene)
@@ -71,7 +71,7 @@ def prepare(
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0, shape=shape_of(scene.indenter, indenters)),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
-        asked=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
+        forced=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
         fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
     run.contact = _place(run)
@@ -79,11 +79,11 @@ def prepare(
 
 
 def handled(sensor: SensorDescriptor, scene: Scene) -> SensorDescriptor:
-    """Return the sensor with the scenario and the nuisances that the scene asks for; raises NotApplicable."""
-    asked = scene.simulation
-    if asked.scenario is None and not asked.nuisances:
+    """Return the sensor with the scene's scenario and nuisances; raises NotApplicable for an unknown scenario."""
+    own = scene.simulation
+    if own.scenario is None and not own.nuisances:
         return sensor
-    spec = sensor.spec.handled(asked.scenario).with_nuisances(dict(asked.nuisances))
+    spec = sensor.spec.handled(own.scenario).with_nuisances(dict(own.nuisances))
     return sensor.model_copy(update={"spec": spec})
 
 
@@ -189,7 +189,7 @@ def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:
 
 
 def check_numbers(scene: Scene) -> None:
-    """Refuse a scene in which a number is none, infinite, or below zero where there is no such thing.
+    """Refuse a scene with a number that is not finite, or negative where that has no meaning.
 
     A radius may be infinite: that is a flat surface.
 

@@ -1,8 +1,9 @@
-"""The twin as a rig: opens a scene, applies its plan, hands out blocks."""
+"""The simulated rig: it applies the plan of a scene and yields the samples as blocks."""
 
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,7 +30,7 @@ from tactbench.plugin import (
     StreamSpec,
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
-from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
@@ -38,10 +39,10 @@ from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
 _CURVE_POINTS = 4001
-"""Of a press curve; straight between them, the force is off by less than 1e-4 of the largest, as in force_loop."""
+"""Points of a press curve; interpolated linearly, the force is off by less than 1e-4 of the largest."""
 REFERENCE_STREAM = "force_torque"
 _PLACE_CHANNELS = tuple(ChannelSpec(name=name, kind="position", unit="m") for name in ("x", "y"))
-"""On the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
+"""Place on the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
 _ONE_CLOCK = Source(
     tag="assumed",
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
@@ -50,7 +51,7 @@ _ONE_CLOCK = Source(
 
 
 class Samples(NamedTuple):
-    """What one stream of a recording holds."""
+    """The samples of one stream of a recording."""
 
     t_ns: npt.NDArray[np.int64]
     """(n,) nanoseconds since the first sample."""
@@ -70,7 +71,7 @@ class TwinAcquisition:
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
     samples: Mapping[str, Samples] = field(repr=False)
-    """By name of the stream."""
+    """Samples by name of the stream."""
     run: Synthesis = field(repr=False)
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
@@ -166,10 +167,22 @@ class Twin:
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
-        from tactbench.rigs.twin.costing import explained
-
-        plan, candidates = self.plan(sensor, scene), self._candidates(sensor, scene)
-        return explained(candidates, self.indenters, handled(sensor, scene), scene, plan, rounds)
+        plan = self.plan(sensor, scene)
+        if not rounds:
+            return [Explained(entry, None) for entry in plan.entries]
+        runs = []
+        for _ in range(rounds + 1):
+            forget_tables()
+            runs.append(carried_out(sensor, scene, 1, plan, DEFAULT, self.indenters))
+        del runs[0]  # its times include imports
+        forget_tables()  # the next recording of the scene solves its contact itself
+        rows = []
+        for entry in plan.settled(runs[-1].settled):
+            if entry.included and entry.effect not in plan.lent:
+                rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))
+            else:
+                rows.append(Explained(entry, None, "part of the contact" if entry.included else ""))
+        return rows
 
 
 def build(context: RigContext) -> Twin:
@@ -217,7 +230,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "contact_s_mm": contact_s,
             **_sizes(run),
             **_stated(run.scene, run.sensor.spec),
-            **_asked(run.scene),
+            **_simulated_as(run.scene),
         },
         drawn=dict(run.drawn),
         samples=samples,
@@ -271,15 +284,15 @@ _STATED = frozenset({
     "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
     "surface_kinetic_friction", "surface_roughness_um",
 })  # fmt: skip
-"""Nuisances that a recording states where its scene does; others only where they were set for the run."""
+"""Nuisances that every recording states; others are stated only where they were set for the run."""
 
 
 def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
-    """Return the nuisances of the scene that decide most, those that were set, and the slide."""
-    asked = dict(scene.simulation.nuisances)
-    kept = _STATED | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
+    """Return the most important nuisances of the scene, those that were set for the run, and the slide."""
+    own = dict(scene.simulation.nuisances)
+    kept = _STATED | own.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
     stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in kept}
-    stated |= {name: amount.value for name, amount in sensor.settable().items() if name in asked}
+    stated |= {name: amount.value for name, amount in sensor.settable().items() if name in own}
     if scene.drive is not None and scene.drive.cutoff is None:
         stated["drive_cutoff_hz"] = "none"
     if scene.slide is not None:
@@ -287,18 +300,12 @@ def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
     return stated
 
 
-def _asked(scene: Scene) -> dict[str, Scalar]:
-    """Return what the scene asks of a simulation beyond the default: printed with every row."""
-    asked: dict[str, Scalar] = {}
-    if scene.simulation.effects:
-        asked["effects"] = " ".join(scene.simulation.effects)
-    if scene.simulation.rung is not None:
-        asked["rung"] = scene.simulation.rung
-    if scene.simulation.tolerance is not None:
-        asked["tolerance_count"] = scene.simulation.tolerance
-    if scene.simulation.scenario is not None:
-        asked["scenario"] = scene.simulation.scenario
-    return asked
+def _simulated_as(scene: Scene) -> dict[str, Scalar]:
+    """Return the scene's settings of the simulation that differ from the default: printed with every row."""
+    own = scene.simulation
+    found = {"effects": " ".join(own.effects) or None, "rung": own.rung, "tolerance_count": own.tolerance}
+    found["scenario"] = own.scenario
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:

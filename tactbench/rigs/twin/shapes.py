@@ -33,22 +33,22 @@ _STEP_MM = 1e-4
 
 @dataclass(frozen=True)
 class Shape:
-    """A body that is neither flat nor a cap, as a scene wants it."""
+    """An indenter that is neither flat nor a cap, with its dimensions and orientation."""
 
     name: str
     sizes: tuple[tuple[str, float], ...]
     """Its dimensions, each in its own unit."""
     angle: float
-    """By how much it is turned about the press axis, from x towards s [rad]."""
+    """Rotation about the press axis, from x towards s [rad]."""
     height: Callable[..., FloatArray] = field(repr=False, compare=False)
 
     def height_mm(self, x_mm: FloatArray, s_mm: FloatArray) -> FloatArray:
-        """Return its height above its lowest point at places (broadcast) from its axis along x and s.
+        """Return the height of the shape above its lowest point, at places (broadcast) from its axis along x and s.
 
         Raises
         ------
         PluginContractError
-            If its plugin returns another shape, or what is no finite number.
+            If its plugin returns an array of another shape, or numbers that are not finite.
         """
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         x, y = np.broadcast_arrays(cos * x_mm + sin * s_mm, cos * s_mm - sin * x_mm)
@@ -63,21 +63,21 @@ class Shape:
         return found
 
     def slope(self, x_mm: FloatArray, s_mm: FloatArray) -> FloatArray:
-        """Return how steep it is at places from its axis [1]."""
+        """Return the slope [1] of the shape at places from its axis."""
         along = self.height_mm(x_mm + _STEP_MM, s_mm) - self.height_mm(x_mm - _STEP_MM, s_mm)
         across = self.height_mm(x_mm, s_mm + _STEP_MM) - self.height_mm(x_mm, s_mm - _STEP_MM)
         return np.asarray(np.hypot(along, across) / (2 * _STEP_MM), dtype=np.float64)
 
 
 def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Shape | None:
-    """Return the shape that a scene names; None for a cap and a flat surface, which its radius says.
+    """Return the shape that a scene names; None for a cap or a flat surface, which the radius describes.
 
     Raises
     ------
     RigError
         If no such shape is installed.
     UsageError
-        If a dimension is none of its own, in another unit, or out of its range.
+        If a dimension is unknown, in another unit, or out of its range.
     """
     if indenter.shape is None:
         return None
@@ -138,7 +138,7 @@ def pin(x_mm: FloatArray, y_mm: FloatArray, *, radius: float, fillet: float) -> 
 
 
 def sag_mm(r2: FloatArray, radius: float) -> FloatArray:
-    """Return how far a circle has risen at the square of a distance from its lowest point; 0 for an infinite radius.
+    """Return the height of a circle above its lowest point at a squared distance from it; 0 for an infinite radius.
 
     ``r² / (R + sqrt(R² - r²))``, in which nothing cancels.
     """

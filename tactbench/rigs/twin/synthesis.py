@@ -1,4 +1,4 @@
-"""The recording in the making: what the effects of a plan read and write, in the plan's order."""
+"""The state of a simulated recording, which the effects of its plan read and change in turn."""
 
 from __future__ import annotations
 
@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
-from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    FloatArray,
+    NotApplicable,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    load_object,
+)
+from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances, Skin
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
@@ -49,30 +58,30 @@ class Load:
 
 
 class Tangential(NamedTuple):
-    """What happens along the skin at (n,) moments, in the direction of the slide."""
+    """The tangential state of the contact at (n,) moments, in the direction of the slide."""
 
     force_n: FloatArray
     """Tangential force between surface and skin, as a force sensor behind the surface feels it."""
     displacement_mm: FloatArray
-    """Of the skin under the contact, against the core."""
+    """Displacement of the skin under the contact relative to the core."""
     slip_mm_s: FloatArray
     """Speed of the surface over the skin; 0 while they stick."""
     slip_mm: FloatArray
-    """Way that the surface has slipped over the skin."""
+    """Distance that the surface has slipped over the skin."""
     slipping: npt.NDArray[np.bool_]
-    """The whole contact slips."""
+    """Whether the whole contact slips."""
     stick_ratio: FloatArray
     """Radius of the part that sticks over that of the contact, 0 to 1."""
 
 
 class Settled(NamedTuple):
-    """What only the solve could decide about an effect."""
+    """The entry of an effect in the plan that is decided after the contact is solved."""
 
     included: bool
     reason: str
     change: float | None = 0.0
-    """What leaving it out changes in an observed channel [the plan entry's unit]: at most, if it was; about, if it was
-    not; None: not known."""
+    """Change of an observed channel by leaving it out [the plan entry's unit]: a bound for effects left out, an
+    estimate for others; None: not known."""
 
 
 @dataclass
@@ -82,19 +91,19 @@ class Track:
     clock: str
     """Name of the stream whose own clock it is; empty: the scene's reference clock."""
     channels: tuple[ChannelSpec, ...]
-    """In order of the sensor's streams."""
+    """Channels in the order of the sensor's streams."""
     t_s: FloatArray
     """(n,) seconds since the recording's first sample."""
     force_n: FloatArray
     """(n,) true normal force at this clock's samples."""
     readings: FloatArray
-    """(n, channels) what the channels would say; starts at rest."""
+    """(n, channels) readings; they start at rest."""
     quality: npt.NDArray[np.uint8]
     """(n, channels)"""
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
-    """(n,) force the response of a kind of channel follows, where it is not the true one."""
+    """(n,) force that the response of a kind of channel follows, where it differs from the true one."""
     vibration_mm: FloatArray | None = None
-    """(n,) motion of the skin along its normal, beyond what the load explains; None: nothing shakes it."""
+    """(n,) vibration of the skin along its normal; None if there is none."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
     warmth_k: FloatArray | None = None
@@ -109,7 +118,7 @@ class Track:
 
     @property
     def scope(self) -> tuple[str, ...]:
-        """What tells this clock's random draws from those of another."""
+        """Scope of this clock's random draws, which differ from those of other clocks."""
         return (self.clock,) if self.clock else ()
 
 
@@ -131,65 +140,78 @@ class Synthesis:
     """The sensor's channels, clock by clock."""
     contact: Contact
     reference_n: FloatArray
-    """(n,) what the force sensor says; starts at the true force."""
+    """(n,) reading of the force sensor; starts at the true force."""
     fluid_pressure: bool = False
-    """The pressure of the fluid is observed."""
+    """Whether the pressure of the fluid is observed."""
     tangential: bool = False
-    """What the skin does along itself is observed."""
+    """Whether the tangential state of the skin is observed."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
-    """What happens along the skin at any (n,) seconds; None: nothing."""
+    """Function from (n,) seconds to the tangential state; None if nothing slides."""
     lent: dict[str, str] = field(default_factory=dict)
-    """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
+    """Effects that the solver may apply: name -> ``module:callable``."""
     settled: dict[str, Settled] = field(default_factory=dict)
-    """Plan entries that only the solve could decide, by name."""
-    asked: frozenset[str] = frozenset()
-    """Effects that the scene asks for by name: they are applied whatever the solve says."""
+    """Plan entries that were decided after the contact was solved, by name."""
+    forced: frozenset[str] = frozenset()
+    """Effects that the scene includes by name: they are applied whatever the solution of the contact."""
     fidelity: Fidelity = DEFAULT
     """How finely the contact is resolved."""
     rung: str = ""
     """Name of the rung that was chosen to keep a tolerance."""
     rung_error: float | None = None
-    """Its estimated error in the worst observed channel, in the channel's unit; None: not estimated."""
+    """Estimated error of the rung in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
-    """What was drawn or achieved."""
+    """Random draws and achieved accuracies that the recording keeps."""
     clock: Callable[[], float] = time.perf_counter
-    """Seconds, monotonic."""
+    """Monotonic clock, in seconds."""
     spent_s: dict[str, float] = field(default_factory=dict)
-    """Seconds each applied effect took: an effect that is not here was not stepped."""
+    """Seconds spent on each applied effect."""
     elsewhere_s: float = 0.0
-    """Seconds that the effect being applied spent on work booked under another one."""
+    """Seconds of the present effect that are counted under another one."""
 
     def apply(self, effect: EffectDescriptor) -> None:
-        """Apply one effect, and book what it takes."""
+        """Apply one effect, and count the seconds that it takes."""
         began, self.elsewhere_s = self.clock(), 0.0
         load_object(effect.where)(self)
         own = self.clock() - began - self.elsewhere_s
         self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
 
     def follow(self, load: Load) -> None:
-        """Let the true force be `load`: on every clock, and as what the force sensor starts from."""
+        """Make `load` the true force, on every clock and for the force sensor."""
         self.load = load
         self.reference_n = load.at(self.t_s)
         for track in self.tracks:
             track.force_n = load.at(track.t_s)
+
+    @property
+    def skin(self) -> Skin:
+        """The sensor's skin.
+
+        Raises
+        ------
+        NotApplicable
+            If the sensor declares none.
+        """
+        if self.sensor.spec.skin is None:
+            raise NotApplicable(f"{self.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
+        return self.sensor.spec.skin
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
         """Return the nuisances of a kind of channel; None when the spec states none."""
         return self.sensor.spec.nuisances.get(kind)
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator of what belongs to this sensor unit: the same in every recording of it under a seed."""
+        """Return the generator of properties of this sensor unit, which all its recordings under a seed share."""
         scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
         return generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
-        """Return the generator of what the recordings of a session share."""
+        """Return the generator of properties that the recordings of a session share."""
         return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator of what is this recording's own."""
+        """Return the generator of properties of this recording alone."""
         return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The simulation held against laws and closed forms: what ``tactbench twin verify`` prints, a line each.
+"""Comparison of the simulation with laws and closed forms, for ``tactbench twin verify``.
 
 The references of the solvers (boundary elements, finite elements, fine grids) are tests: ``pytest tests/oracles``.
 """
@@ -26,31 +26,29 @@ from tactbench.rigs.twin.rig import Twin, build
 
 RADIUS_MM = 10.0
 _TASK = "force"
-"""Its first scene is planned for every sensor that is looked at."""
+"""Task whose first scene is simulated for each sensor."""
 
 
 def verdicts() -> Iterator[Verdict]:
-    """Yield the verdicts, each computed when it is asked for."""
+    """Yield the verdicts; each is computed when the iteration reaches it."""
     yield from _contact()
     registry = load_registry()
     twin = build(rig_context(registry))
     for name in ("biotac", "icub"):
-        if name in registry.sensors:
-            scene = registry.tasks[_TASK].spec.scenes[0].scene
-            yield from _skin(twin, registry.sensors[name], scene)
-            yield _left_out(twin, registry.sensors[name], scene)
+        scene = registry.tasks[_TASK].spec.scenes[0].scene
+        yield from _skin(twin, registry.sensors[name], scene)
+        yield _left_out(twin, registry.sensors[name], scene)
     yield from _memory()
     yield _stick_slip()
 
 
-def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float, float]:
-    """Return what the effects left out of `scene` change, what they may, and what noise hides: counts.
+def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
+    """Return the change [count] by the effects left out of `scene`, and the bound on it by the plan.
 
     Returns
     -------
     largest difference of any observed reading, before it is rounded, between a run with every effect and one with the
-    plan's; the sum of the bounds that the plan states; the least standard deviation of noise and rounding of an
-    observed kind, infinite without any stated noise.
+    plan's; the sum of the bounds that the plan states.
     """
     every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
     simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})
@@ -58,9 +56,7 @@ def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, 
     whole, _ = _unrounded(twin, sensor, scene.model_copy(update={"simulation": simulation}))
     largest = max(float(np.abs(a - b).max()) for a, b in zip(planned, whole, strict=True))
     bounds = [math.inf if entry.change is None else entry.change for entry in entries if not entry.included]
-    stated = [sensor.spec.nuisances[kind] for kind in scene.observe if kind in sensor.spec.nuisances]
-    floors = [nuisances.hidden(scene.environment.noise_scale) for nuisances in stated]
-    return largest, sum(bounds), min((floor for floor in floors if floor > 0), default=math.inf)
+    return largest, sum(bounds)
 
 
 def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list[FloatArray], tuple[PlanEntry, ...]]:
@@ -71,7 +67,7 @@ def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list
 
 
 def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdict]:
-    """Yield the balances that a sensor's own skin keeps under 2 N."""
+    """Yield the force balance of a sensor's skin under 2 N and, over a fluid, the balance of volume."""
     press = press_of(prepare(sensor, scene, 1, twin.plan(sensor, scene)), DEFAULT)
     state = press(2.0)
     carried = float(state.pressure_mpa.sum() * np.prod(state.grid.cell_mm))
@@ -83,7 +79,7 @@ def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdic
 
 
 def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
-    largest, bound, _ = omitted(twin, sensor, scene)
+    largest, bound = omitted(twin, sensor, scene)
     # Rounding in the last digits of readings of thousands of counts.
     source = "0: the plan leaves out what changes nothing; bound: the sum of those that it states"
     return Verdict(f"{sensor.name}, {scene.name}: change by all effects that are left out", largest, 0.0, bound + 1e-9,
@@ -93,7 +89,7 @@ def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
 def _pressed(
     poisson: float, thickness_mm: float, side_mm: float, cells: int, penalty: float, force_n: float
 ) -> SkinState:
-    """Return a bonded layer of E = 1 MPa under a paraboloid, solved as every recording is; its depth from the apex."""
+    """Return the state of a bonded layer, E = 1 MPa, under a paraboloid; its depth is counted from the apex."""
     why = "an exercise"
     half, arc = assumed(side_mm / 2, "mm", why), assumed(side_mm, "mm", why)
     skin = BondedLayer(

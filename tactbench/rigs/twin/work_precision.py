@@ -1,4 +1,4 @@
-"""The twin's work-precision diagram: rungs, grids and sizes of the load table, error against seconds per recording."""
+"""The twin's work-precision diagram: error against seconds per recording, for rungs, grids and load tables."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LOADS = 12
 """Loads at which readings are compared; drawn between the table's nodes, where interpolation errs most."""
 GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
 NODES = (9, 11, DEFAULT.most_nodes, 32)
-"""Most nodes of a table; it stops earlier where noise hides the rest."""
+"""Limits on the nodes of a load table; refinement ends earlier where noise hides the remaining error."""
 ROUNDS = 5
 _REFERENCE = RUNGS["reference"]
 
@@ -44,9 +44,9 @@ _REFERENCE = RUNGS["reference"]
 def study(
     sensor: SensorDescriptor, clock: Callable[[], float] = time.process_time, *, rounds: int = ROUNDS
 ) -> CostStudy:
-    """Return the diagram of one sensor, still to be measured, every recording timed `rounds` times.
+    """Return the jobs that measure the diagram of one sensor; every recording is timed `rounds` times.
 
-    A job raises what its rung says of a skin that it does not do.
+    A job raises the error of a rung that does not support the skin.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def study(
 
 
 def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
-    """Yield family, label and fidelity of everything that is measured."""
+    """Yield family, label and fidelity of every point to be measured."""
     skin = sensor.spec.skin
     assert skin is not None
 
@@ -84,7 +84,7 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
         along, across = fidelity.cells(skin.sheet)
         return family, f"{family}, {along} x {across}, up to {fidelity.most_nodes} nodes", fidelity
 
-    # Also of a skin that this rung does not do: it says why.
+    # Also for a skin that this rung does not support: its error is a row of the diagram.
     for nodes in NODES[:3]:
         yield named("closed form", dataclasses.replace(RUNGS["closed-form"], most_nodes=nodes))
     for factor in GRIDS:
@@ -101,7 +101,7 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
 
 
 def _rung(fidelity: Fidelity) -> str:
-    """Return the name of the rung that is exactly this; empty: none is."""
+    """Return the name of the rung with this fidelity, or an empty string."""
     return next((name for name, own in RUNGS.items() if own == fidelity), "")
 
 

@@ -1,6 +1,6 @@
-"""Where the 19 electrodes sit on the core.
+"""Positions of the 19 electrodes on the core.
 
-The same table stands in TAMS-Group/biotac_gazebo_plugin (``sim_biotac.h``) and in clear-nus/biotac_driver
+The same table is found in TAMS-Group/biotac_gazebo_plugin (``sim_biotac.h``) and in clear-nus/biotac_driver
 (``biotac_logger_v3.py``): millimetres, x towards the tip, -z towards the pad, and the outward unit normals.
 """
 

@@ -1,6 +1,6 @@
-"""A BioTac as a model on SPI: bytes in, bytes out, on a clock that is passed in.
+"""Emulator of a BioTac on SPI; it maps received bytes to sent bytes at given times.
 
-Written from the public sources of :mod:`tactbench.sensors.biotac.codec`, never held against a real sensor. No source
+Written from the public sources of :mod:`tactbench.sensors.biotac.codec`, never compared with a real sensor. No source
 states the order in which a sensor checks parity, command and channel, what it puts on the line during a command, what
 follows a property's last byte, nor which commands but sampling need a pause: these are assumed, below.
 """
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatorSettings, Senses
 
 _ROUNDING_S = 1e-9
-"""Seconds as float64 are 0.1 ns apart after eleven days, and a host's sum of pauses rounds more than once."""
+"""Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""
 
 _IDLE = b"\xff"
-"""What is on the line while the sensor does not drive it [assumed: high]."""
+"""Level of the line while the sensor does not drive it [assumed: high]."""
 
 _FILLERS = (0x00, 0x01)
 """First byte that a host sends while it reads: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual, and a public
@@ -47,7 +47,7 @@ bridge for a PIC32]."""
 
 @dataclass(frozen=True)
 class BioTacFault(Fault):
-    """A fault that the emulator shows.
+    """A fault of the emulated sensor.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class BioTacFault(Fault):
     }
 
     channels: frozenset[str] = frozenset()
-    """Of these channels only; empty: of all."""
+    """Affected channels; empty: all of them."""
     error: int = 0x2E
     """Second byte of an error reply."""
 
@@ -84,9 +84,9 @@ class BioTacFault(Fault):
 @dataclass
 class _Answer:
     data: bytes
-    """What comes over the line."""
+    """Bytes that the host receives."""
     word: bytes = b""
-    """What the sensor sent, to be repeated; empty: nothing."""
+    """Word that a resend repeats; empty: none."""
     channel: str = ""
     early: int | None = None
     """Second byte of the error that is sent instead before `ready_s`."""
@@ -104,11 +104,11 @@ DEFAULT_PROPERTIES: Mapping[str, bytes] = {
     "software version": b"0238",
     "serial number": b"BT2P0220B11E0004",
 }
-"""As in the maker's examples [sourced: QuickStart Guide]."""
+"""Properties of the maker's examples [sourced: QuickStart Guide]."""
 
 
 class Emulator(SpiDeviceEmulator):
-    """One BioTac on an SPI bus.
+    """Emulated BioTac on an SPI bus.
 
     A sampling command samples at its last bit; the word is read after the pause. Several sensors that are selected
     together are several emulators that get the same bytes.
@@ -121,11 +121,11 @@ class Emulator(SpiDeviceEmulator):
     properties
         Bytes of each property; one that is left out is unknown to the sensor.
     faults
-        What goes wrong; the list may be changed at any time.
+        Faults of the sensor; the list may be changed at any time.
     select
-        Mask of its select lines: it hears what is sent with all of them active.
+        Mask of its select lines, which must all be active for it to receive.
     clock_hz
-        Of the bus: how long bytes take.
+        Clock of the bus, Hz, which determines the duration of a byte.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class Emulator(SpiDeviceEmulator):
         self._held: dict[tuple[BioTacFault, str], int] = {}
 
     def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
-        """Return what is on the line while the host clocks `data` in: as many bytes.
+        """Return the bytes that the host receives while it sends `data`.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class Emulator(SpiDeviceEmulator):
         return self._error(0x5F)
 
     def _word(self, word: bytes, channel: str, now_s: float) -> _Answer:
-        """Return a word as it comes over the line; what may be asked for again is the word itself."""
+        """Return the answer with a word, after applying faults of the line; a resend repeats the word without them."""
         answer = _Answer(word, word, channel)
         if self._shown("doubled-reply", channel, now_s) and self._last is not None:
             answer.data = self._last.word
@@ -258,9 +258,9 @@ class Emulator(SpiDeviceEmulator):
 
 
 def build_emulator(settings: EmulatorSettings) -> Emulator:
-    """Return a sensor with what is sensed, as ``SensorDescriptor.emulator`` promises; it draws nothing.
+    """Return a sensor with the given senses, as ``SensorDescriptor.emulator`` promises; it uses no random numbers.
 
-    It is not told the bus's clock and takes the fastest that a sensor allows, so that no pause of 50 us is too short;
+    The clock of the bus is unknown here; with the fastest one that a sensor allows, no pause of 50 us is too short;
     at 4.4 MHz it samples 2 us early and lets a pause pass that is 2 us too short.
 
     Raises

@@ -1,4 +1,4 @@
-"""The finer grid on which the fluid film conducts, and the middle of the film, where current really flows."""
+"""The grid of the conduction in the fluid film, and the middle surface of the film."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.meshes import RAYS_FROM_MM, core_reach_mm
 
 REFINEMENT = 2
-"""Steps of refinement from the skin's grid to the conduction's."""
+"""Refinement of the conduction's grid relative to the skin's."""
 _CELLS_PER_STEP = 0.75, 0.515
 """Conduction cells along and across, for one of the skin's and one step: about square on the film, whose arc is shorter
 than the outer surface's. At two steps, 96 x 66 cells, changes are off by 0.6 % of their rms; at three, by 0.5 %."""

@@ -1,4 +1,4 @@
-"""Core, film and outer surface as the public meshes have them: tables and plain formulas, without any array library.
+"""Core, film and outer surface by the public meshes: tables and formulas, without array libraries.
 
 The electrodes' frame: x along the finger towards the tip, the pad at -z. Up to x = 1.8 mm what faces a point of the
 core is what lies radially above it; beyond, what lies on the ray from (1.8 mm, axis) through it. The sheet's own axial
@@ -30,7 +30,7 @@ _FACET_MM = _AXIAL * (_E7.x_mm - RAYS_FROM_MM) - _DOWN * _E7.z_mm + CORE_MM - EL
 
 
 def sheet_x(x_mm: float, height_mm: float, outer_mm: float, dome_mm: float) -> float:
-    """Return the sheet's axial coordinate of what faces a point of the core.
+    """Return the axial coordinate on the sheet that faces a point of the core.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def ray_on_sheet(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
 
 
 def ray_length(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
-    """Return how far a ray goes to the outer surface."""
+    """Return the length of a ray up to the outer surface."""
     ahead = RAYS_FROM_MM - dome_mm
     # |(ahead + t sine, t cosine)| = outer radius, seen from the dome's centre.
     return math.sqrt(outer_mm**2 - (ahead * math.cos(angle_rad)) ** 2) - ahead * math.sin(angle_rad)

@@ -1,4 +1,4 @@
-"""What comes on top of the BioTac's physics, by kind of channel.
+"""Noise, drift and other nuisances of the BioTac, by kind of channel.
 
 The figures are measured on public recordings of one BioTac (Alexis-Georganopoulos/Robotic-Finger, called RF), of
 another one sliding (dexrob/BioTac_slide_20_50, DX) and of three BioTac SP at rest (RuihanGao/BioTacSP_setup, RG).
@@ -94,7 +94,7 @@ RANGES = ranges(
     ("taxel_creep_1_fraction", 0.0, 0.12, "1", "derived", "RF: 0.11-0.12 of the response remains after release"),
     ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "half of a pad; the paper does not say where its caps touch"),
 )
-"""Between what ends each may lie; factors are on the values above."""
+"""Plausible ranges; factors refer to the values above."""
 
 HARD_HANDLED = Scenario(
     title="pressed hard for a minute, minutes before",
@@ -119,5 +119,5 @@ HARD_HANDLED = Scenario(
         ),
     },
 )
-"""The levels that were read off recordings with hard presses in between, the warm-up counted among them. A session of
+"""Nuisances read off recordings with hard presses in between, warm-up included. A session of
 this kind has larger offsets than the usual one; its values bound from above what such handling does."""

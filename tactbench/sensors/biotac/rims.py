@@ -22,7 +22,7 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray, RigError
 
 _AXIS, _SIGN = np.array([0, 0, 1, 1]), np.array([[-1], [1], [-1], [1]])
-"""Of a cell's four faces."""
+"""Axis and sign of a cell's four faces."""
 _MOST_DECAYS = 9.0
 """Decay lengths inside the rim beyond which a cell counts as joined perfectly: exp(9) is stiff enough."""
 _LEAST_WAY = 0.02
@@ -39,9 +39,9 @@ class Disc(NamedTuple):
     x_mm: float
     s_mm: float
     radius_mm: float
-    """In the film's own metric."""
+    """Radius in the metric of the film."""
     stretch: tuple[float, float] = (1.0, 1.0)
-    """Millimetres of the film for one of the grid's, along x and s, there."""
+    """Local stretch of the film relative to the grid, along x and s."""
 
 
 class RimmedDiscs:

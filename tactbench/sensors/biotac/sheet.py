@@ -28,7 +28,7 @@ from tactbench.sensors.biotac.rims import RimmedDiscs
 
 
 class Faces(NamedTuple):
-    """What the faces between cells conduct at unit thickness: their width over the distance of their cells' centres."""
+    """Conductances of the faces between cells at unit thickness: width over distance of the cells' centres."""
 
     along_x: FloatArray
     """(nx-1, ns)"""
@@ -50,7 +50,7 @@ class FilmSheet:
     Parameters
     ----------
     faces
-        Of the cells, in the film's metric.
+        Faces between the cells, in the film's metric.
     contacts
         Electrodes and excitation on the cells.
     """

@@ -1,4 +1,4 @@
-"""The text log of the maker's tools for the Cheetah adapter, to samples.
+"""Reader of the text log of the maker's tools for the Cheetah adapter.
 
 A line is ``time batch frame channel value parity [value parity ...]``, separated by blanks, one pair for each sensor;
 time in seconds with six decimals, 0.000000 throughout where the host's clock was not read; channel the number of the
@@ -26,9 +26,9 @@ from tactbench.sensors.biotac.frames import FrameRows, quality_of, streams_of
 from tactbench.sensors.biotac.options import LogOptions
 
 _LONGEST_S = 9e9
-"""So long a time in nanoseconds fits in 64 bits."""
+"""Limit on times, which in nanoseconds fit in 64 bits."""
 _MOST_FRAMES = 2**26
-"""More than a week of frames."""
+"""Limit on frame numbers: more than a week of frames."""
 
 
 class _Line(NamedTuple):
@@ -42,9 +42,9 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     """Read a log as ``SensorDescriptor.log_reader`` promises.
 
     Words that the log lacks are marked missing; sequence numbers count from the log's own frame numbers. The order of a
-    frame is that of most frames of the log. An error reply cannot be told from bad parity here, since the log has only
-    the number it looks like. Times are the log's own; a log without times has row number by rate, if the option
-    `rate_hz` or the header states one. A timed log's rate is measured from its first and last row.
+    frame is that of most frames of the log. Error replies cannot be distinguished from bad parity, since the log has
+    only the resulting number. Times are those of the log; without any they are row numbers over the rate, if the option
+    `rate_hz` or the header states one. The rate of a log with times is measured from its first and last row.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _frames(lines: Sequence[str], sensor: int, counts: Counter[str]) -> list[lis
 
 
 def _read(words: list[str], sensor: int) -> _Line | None:
-    """Return one line, or None for what is none."""
+    """Return the parsed line, or None if it is not a sample."""
     pair = words[4 + 2 * sensor : 6 + 2 * sensor]
     if len(words) % 2 or len(pair) < 2:
         return None
@@ -154,7 +154,7 @@ def _read(words: list[str], sensor: int) -> _Line | None:
 def _rate(
     settings: LogOptions, header: str, samples: Sequence[tuple[int, float]]
 ) -> tuple[float | None, Source | None]:
-    """Return commands a second, and where that is from: the option, the header, or the log's positions and times."""
+    """Return commands a second and their source: the option, the header, or the log's positions and times."""
     if settings.rate_hz is not None:
         return settings.rate_hz, Source(tag="sourced", reference="option rate_hz of the import")
     stated = re.search(r"SampRate:\s*([1-9]\d*)", header)

@@ -1,4 +1,4 @@
-"""The BioTac's heat: a core warmed by its own electronics, a thermistor on it, a fluid whose conductivity follows.
+"""Thermal parameters of the BioTac: heated core, thermistor, and conductivity of the fluid.
 
 Lumped: one temperature for core, fluid and skin. What is known are the thermistor's formula, its rest, its band and
 its gain, and the time constant of the shared warm-up; the flow of heat into an indenter is assumed.

@@ -12,7 +12,7 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, skin_grid
 
 BALANCE = 1e-8
 """Relative force balance: a sum over thousands of cells rounds at 1e-13, and the law shall hold far from its edge."""
@@ -87,7 +87,7 @@ def lawful(case, press, loads):
 
 def reaches(press, skin, load):
     """Raise RigError where the indenter ends before the skin that it touches."""
-    check_reach(press, load, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    check_reach(press, load, skin.sheet)
 
 
 def _loads(case, low, high):
@@ -107,7 +107,7 @@ def any_radius(case):
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
     reaches(press, skin, loads[-1])
-    told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
+    told = remarks(press, loads, skin.sheet)
     few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
         ("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it"
@@ -143,7 +143,7 @@ def unresolved_contact(case):
     load = case.decades(1e-3, 3.0)
     coarse, fine = press_of(skin, contact), press_of(skin, contact, (96, 96))
     depth = lawful(case, coarse, [load])[0].depth_mm
-    if "remark contact" in remarks(coarse, [load], math.inf):
+    if "remark contact" in remarks(coarse, [load], skin.sheet):
         return
     wanted = fine(load).depth_mm
     case.holds(abs(depth / wanted - 1) <= 0.05, f"depth {depth:g} mm against {wanted:g} mm, and no remark")
@@ -178,7 +178,7 @@ def any_load(case):
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
     reaches(press, skin, loads[-1])
-    case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
+    case.holds("remark load" in remarks(press, loads, skin.sheet), "500 N and no remark")
 
 
 def loads_that_are_none(case):

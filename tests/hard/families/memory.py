@@ -1,4 +1,4 @@
-"""Hard times for the filters with memory: long steps, repeated and backward time stamps, clocks with a huge offset."""
+"""Hard times for the filters with memory: long steps, repeated time stamps, clocks with a huge offset."""
 
 import math
 
@@ -72,22 +72,6 @@ def repeated_times(case):
     )
 
 
-def backward_times(case):
-    """Refuse a clock that runs backwards once, or says no number: no answer to it would be right."""
-    tau = case.decades(1e-3, 1e3)
-    t_s = np.append(_times(case, tau, repeated=0.0), np.nan)
-    t_s[-1] = t_s[-2] + tau
-    place = int(case.rng.integers(1, t_s.size))
-    t_s[place] = (t_s[place - 1] - case.decades(1e-6, 1e3) * tau, math.nan, math.inf, -math.inf)[case.rng.integers(4)]
-    case.right = "refusal"
-    if place == t_s.size - 1 and t_s[place] == t_s[place - 1]:  # a step that drowned in the clock's own size
-        case.right = "answer"
-    if case.chance(0.5):
-        lag(t_s, np.ones(t_s.size), tau)
-    else:
-        wandering(t_s, 1.0, tau, 2, case.rng)
-
-
 def no_time_constant(case):
     """Refuse a time constant of zero, below zero or no number."""
     case.right = "refusal"
@@ -139,6 +123,6 @@ def drift_over_any_steps(case):
 
 
 FAMILIES = (
-    lag_over_any_steps, lag_in_equilibrium, repeated_times, backward_times, no_time_constant, one_step_is_two,
+    lag_over_any_steps, lag_in_equilibrium, repeated_times, no_time_constant, one_step_is_two,
     clocks_far_from_zero, drift_over_any_steps,
 )  # fmt: skip

@@ -204,7 +204,7 @@ def test_a_shape_that_the_grid_cannot_resolve_is_refused(body):
     ],
 )
 def test_a_narrow_line_however_long_and_a_flank_steeper_than_45_degrees_are_remarked_upon(sizes, load, expected):
-    assert expected in remarks(layered(shape("edge", **sizes)), (load,), math.inf)
+    assert expected in remarks(layered(shape("edge", **sizes)), (load,), LAYER.sheet)
 
 
 def test_a_shape_that_is_not_installed_or_of_another_unit_is_refused_with_what_there_is(sensors):

@@ -84,10 +84,10 @@ def test_wanted_channels_come_in_the_order_asked_for():
 
 
 def test_pressure_alone_solves_no_film():
-    # A film nobody looks at is not solved: this one would be refused.
-    state = state_of(SPEC, GRID, thickness_mm=np.full((64, 64), np.nan))
+    # A film that no requested channel reads is not solved: this one would be refused.
+    state = state_of(SPEC, GRID, np.full((64, 64), np.nan))
     assert reading(state, ["PDC"]) == pytest.approx([2500.0])
-    with pytest.raises(RigError, match="not this sensor's film"):
+    with pytest.raises(RigError, match="finite and positive"):
         reading(state, ["E1"])
 
 

@@ -83,5 +83,3 @@ def test_what_cannot_be_given_is_refused_by_name():
         build(BIOTAC, grid_of(BIOTAC), ["E1"])
     with pytest.raises(RigError, match="outside"):
         taxel_weight(GRID, (40.0, 0.0), 1.25)
-    with pytest.raises(RigError, match="cells"):
-        build(SPEC, GRID, NAMES)(state_of(SPEC, grid_of(SPEC, 2.0)))

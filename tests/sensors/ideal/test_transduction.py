@@ -57,5 +57,3 @@ def test_readings_add_and_scale_with_pressure_and_come_in_the_order_asked_for():
 def test_unknown_taxels_and_other_grids_are_refused():
     with pytest.raises(RigError, match="T17"):
         build(SPEC, GRID, ["T17"])
-    with pytest.raises(RigError, match="cells"):
-        build(SPEC, GRID, NAMES)(state_of(SPEC, FINE))

@@ -1,4 +1,4 @@
-"""The file of one cell: its row, what its key is made of, its provenance and its answers, in HDF5."""
+"""The HDF5 file of one cell: its row, the sections of its key, its provenance and its answers."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _COLUMNS = tuple(column.name for column in fields(Answers))
 
 @dataclass(frozen=True)
 class CellFile:
-    """What the file of a cell holds."""
+    """Content of the file of a cell."""
 
     row: dict[str, Any]
     """As `tactbench.core.spec.row.RowModel` describes it."""
     sections: Mapping[str, Any] = field(default_factory=dict)
-    """What its key is made of, by section."""
+    """Sections of its key."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     ended_ns: int = 0
-    """When it was written, nanoseconds since the epoch: of two files of one cell the later counts."""
+    """Time of writing, nanoseconds since the epoch; the latest file of a cell counts."""
     answers: Mapping[str, Answers] = field(default_factory=dict)
-    """By role; none of a cell that did not finish."""
+    """Answers by role; empty for a cell that did not finish."""
 
     @property
     def text(self) -> str:
@@ -41,7 +41,7 @@ class CellFile:
 
     @property
     def digests(self) -> dict[str, str]:
-        """Of the answers, by role."""
+        """Digests of the answers by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
 
     def content(self) -> bytes:
@@ -65,7 +65,7 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
     Raises
     ------
     FormatError
-        If it is none, or does not hold what was written.
+        If the file is not a cell, or was changed after it was written.
     """
     import h5py
 
@@ -89,7 +89,7 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
 
 
 def _opening(body: bytes) -> bytes:
-    """Return what the user block of a file holds: the HDF5 library may crash on bytes that are damaged."""
+    """Return the content of the user block, with a digest: the HDF5 library may crash on damaged files."""
     return FORMAT + hashlib.sha256(body).hexdigest().encode()
 
 

@@ -1,7 +1,7 @@
 """``results.sqlite``: an index of the files of a result folder, for quick listings and for queries.
 
-The files are the truth. An index that is lost, damaged or of another version is made anew; what it says of a file
-counts as long as the file has the size and time of modification that it had when it was read. Where it cannot be
+The files are authoritative. A lost, damaged or outdated index is rebuilt from them; an entry is valid as long as size
+and modification time of its file are unchanged. Where it cannot be
 written, on a read-only disk, the index lives in memory.
 """
 
@@ -28,7 +28,7 @@ COLUMNS = {
     for name, kinds in FORMAT.items()
     if not kinds & {dict, list}
 }
-"""Keys of a row with a column of their own: all that are neither tables nor lists."""
+"""Columns of the index: the keys of a row that are neither mappings nor lists."""
 _SCHEMA = f"""
 CREATE TABLE IF NOT EXISTS cells (
   file TEXT PRIMARY KEY, size INTEGER, modified_ns INTEGER, ended_ns INTEGER,
@@ -45,18 +45,12 @@ PRAGMA user_version = {VERSION};
 
 
 class Index:
-    """The index of one result folder; opened when made.
-
-    Parameters
-    ----------
-    folder
-        The result folder.
-    """
+    """The index of the result folder `folder`, opened at once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.troubles: list[str] = []
-        """Files that could not be read, in sentences."""
+        """Sentences about files that could not be read."""
         self._database = _opened(folder / "results.sqlite")
         self.refresh()
 
@@ -76,7 +70,7 @@ class Index:
                 self.troubles.append(str(error))
 
     def put(self, path: Path, cell: CellFile) -> None:
-        """Enter what the file of a cell holds."""
+        """Add or replace the entry of the file of a cell."""
         row = cell.row
         values = [row.get(name) for name in COLUMNS]
         facts = (path.name, *signature(path), cell.ended_ns, *values, json.dumps(row))
@@ -84,7 +78,7 @@ class Index:
         self._all("INSERT OR IGNORE INTO provenance VALUES (?, ?)", row.get("made_by", ""), json.dumps(cell.provenance))
 
     def drop(self, name: str) -> None:
-        """Take a file out."""
+        """Remove the entry of a file."""
         self._all("DELETE FROM cells WHERE file = ?", name)
 
     def files_of(self, cell: str) -> list[tuple[str, str, str]]:

@@ -1,4 +1,4 @@
-"""A result folder: what a run writes into it, and what is read from it."""
+"""Reading and writing of a result folder."""
 
 from __future__ import annotations
 
@@ -33,28 +33,22 @@ _FULL = {
 
 
 class Store:
-    """A result folder. Making one reads and writes nothing; :meth:`hold` makes the folder.
-
-    Parameters
-    ----------
-    folder
-        Where results lie, or will lie.
-    """
+    """A result folder at the path `folder`, which need not exist: :meth:`hold` makes it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
         self.superseded: list[str] = []
-        """Cells whose latest answer, since this was made, is no more the one from other recordings."""
+        """Cells whose latest answer was replaced, by this object, with one from other recordings."""
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
-        """Keep the folder to this run: made if it is not there, locked until the end.
+        """Create the folder if necessary, and lock it for this run until the end of the context.
 
         Raises
         ------
         FolderError
-            If another run holds it, or it cannot be made or written.
+            If another run holds the folder, or it cannot be created or written.
         """
         with writing(self.folder):
             for part in ("recordings", "cells"):
@@ -78,7 +72,7 @@ class Store:
         return Index(self.folder)
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
-        """Have cells that are written from now on carry this provenance, and return its id."""
+        """Set the provenance of cells that are written from now on, and return its id."""
         self._provenance = provenance_id(provenance), provenance
         return self._provenance[0]
 
@@ -94,7 +88,7 @@ class Store:
         Raises
         ------
         FolderError
-            If the disk refuses, or the folder is gone; what was finished before stays.
+            If the folder cannot be written; finished cells are kept.
         ValueError, TypeError
             If the row is not plain data; nothing is written.
         """
@@ -105,7 +99,7 @@ class Store:
         return kept
 
     def reuse(self, row: Row) -> None:
-        """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
+        """Make a finished cell the latest one of its name in `row`."""
         latest = self._files.files_of(row["cell"])
         if not latest or latest[0][1] != row["key"]:
             cell = read_cell(self.file_of(row))
@@ -133,15 +127,15 @@ class Store:
 
     @property
     def troubles(self) -> tuple[str, ...]:
-        """What of this folder could not be used, in sentences."""
+        """Sentences about files of this folder that could not be read."""
         return tuple(self._files.troubles)
 
     def rows(self) -> list[Row]:
-        """Return how every cell ended that ever did, the latest of each name, in the order of the names."""
+        """Return the latest row of every cell, in the order of their names."""
         return list(self._files.latest())
 
     def cell(self, row: Mapping[str, Any]) -> CellFile:
-        """Return all that is kept of the cell of a row; raises FormatError if its file cannot be used."""
+        """Return the content of the file of a row's cell; raises FormatError if it cannot be read."""
         return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
@@ -161,7 +155,7 @@ class Store:
     def about(self, recording: Path) -> Mapping[str, Any]:
         """Return content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
 
-        There is no scene where nobody planned it, for example that of an imported table.
+        The scene is None for recordings without a planned scene, such as an imported table.
         """
         return self._files.recording(recording, _read_recording)
 
@@ -199,7 +193,7 @@ def _check_written(path: Path, cell: CellFile) -> None:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Turn what the system refuses while `folder` is written into a FolderError that says what to do."""
+    """Turn system errors while `folder` is written into a FolderError with a hint."""
     try:
         yield
     except OSError as error:

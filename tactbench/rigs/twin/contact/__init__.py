@@ -1,1 +1,1 @@
-"""How the skin answers a load: media, the Newton solver, load tables."""
+"""The response of the skin to a load: media, solvers and load tables."""

@@ -1,4 +1,4 @@
-"""The rigid core under a fluid-backed skin: it carries what the closed film no longer can.
+"""The rigid core under a fluid-backed skin, which carries load where the film is closed.
 
 Imported only when a load closes the film. Below that load the solution without the core is the solution with it, so
 leaving it out changes nothing.
@@ -37,6 +37,6 @@ class CoreReaction:
 
 
 def with_core(medium: Medium, skin: FluidBackedShell) -> Medium:
-    """Return `medium` with a core that answers once less than the residual film is left."""
+    """Return `medium` with a core that carries load where less than the residual film is left."""
     film = medium.rest_thickness_mm - medium.least_thickness_mm
     return replace(medium, respond=CoreReaction(medium.respond, skin.core_stiffness.to("MPa/mm"), film))

@@ -11,14 +11,14 @@ from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import skin_grid
 
 CUT_OVER = 0.97
-"""Share of the densification strain beyond which the law goes on along its tangent: it cannot divide by zero."""
+"""Share of the densification strain beyond which the law is continued by its tangent, to avoid a division by zero."""
 OUTSIDE_THE_PAD = 1e-2
 """Stiffness of the margin around the pad, relative to the foam."""
 
 
 CONTACT_UPDATES = 2
-"""With the iCub's contact stiffness ten times as much then changes no taxel by more than 0.08 counts (18 contacts of 5
-mm to flat, 0.1 to 5 N); without, taxels are off by up to 1.6."""
+"""Corrections for the penalty's penetration. With them, ten times the iCub's contact stiffness changes no taxel by more
+than 0.08 counts (18 contacts of 5 mm to flat, 0.1 to 5 N); without, by up to 1.6."""
 
 
 class Foam:
@@ -55,7 +55,7 @@ class Foam:
 
 
 def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
-    """Return where a pad from `low` to `high` ends: at edges of the sheet's own cells, whose centres lie inside.
+    """Return the ends of a pad from `low` to `high`: edges of those cells of the sheet whose centres lie inside.
 
     The reference figures of the solver hold for this pad; on whatever grid, so that a finer one converges to it.
     """

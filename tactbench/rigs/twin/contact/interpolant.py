@@ -1,4 +1,4 @@
-"""A cubic through load nodes that keeps their shape, with breaks no cubic crosses."""
+"""Shape-preserving cubic interpolation over load nodes, with breaks between its parts."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
 
 
 _PIECES = 8
-"""Pieces of an interval on each of which a slope is bounded."""
+"""Number of pieces of an interval for bounding the slope."""
 _ROUNDING_N = 0.05
-"""Added under the power: its slope at the break would be infinite, and no reading's is."""
+"""Offset under the power, without which its slope at the break would be infinite."""
 
 
 class Interpolant:
@@ -102,7 +102,7 @@ class Interpolant:
         return out
 
     def steepest(self, low: float, high: float) -> FloatArray:
-        """Return the (c,) largest absolute slopes between two loads within the nodes' range, at least: bounds.
+        """Return (c,) upper bounds of the absolute slopes between two loads within the nodes' range.
 
         A cubic's slope is a parabola: on each piece its ends and its vertex. Where the cubics run in a power of the
         load the factor between the two slopes is monotone, so that its larger end bounds it on a piece.

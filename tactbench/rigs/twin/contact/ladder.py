@@ -14,23 +14,22 @@ from tactbench.rigs.twin.fidelity import FINE, RUNGS
 from tactbench.rigs.twin.synthesis import Synthesis
 
 TABLE_SHARE = 1 / 3
-"""Of a tolerance; the rung may use the rest."""
+"""Share of a tolerance for the load table; the rung may use the rest."""
 _PROBES = (0.3, 1.0)
 """Shares of the largest load at which neighbouring rungs are compared."""
-_MOST_KEPT = 64
 _CHOSEN: dict[bytes, tuple[str, float]] = {}
 
 
 def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
     """Give `run` the cheapest rung that keeps the scene's tolerance, and the estimate of its error.
 
-    A rung's error is estimated by what the next one says otherwise at two loads, in the worst channel. The last rung
-    has no next: halving a grid's cells at least halves its error, so that its error is at most what it changed.
+    The error of a rung is estimated by its largest difference to the next rung, over two loads and all channels. That
+    of the last rung is at most its difference to the one before, since halving the cells at least halves the error.
 
     Raises
     ------
     RigError
-        If no rung keeps the tolerance; the message has the best there is.
+        If no rung keeps the tolerance; the message names the smallest error reached.
     """
     tolerance = run.scene.simulation.tolerance
     if tolerance is None:
@@ -40,27 +39,18 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
     text = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{run.tangential}|{slide_of(run)}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key not in _CHOSEN:
-        if len(_CHOSEN) >= _MOST_KEPT:
-            _CHOSEN.pop(next(iter(_CHOSEN)))
         _CHOSEN[key] = _cheapest(run, names, largest_n, tolerance)
     run.rung, run.rung_error = _CHOSEN[key]
     run.fidelity = dataclasses.replace(RUNGS[run.rung], most_nodes=FINE.most_nodes)
 
 
 def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: float) -> tuple[str, float]:
-    known: dict[str, FloatArray | None] = {}
-
-    def said(name: str) -> FloatArray | None:
-        if name not in known:
-            known[name] = _probed(run, names, largest_n, name)
-        return known[name]
-
-    error = float("inf")
+    error, own = float("inf"), _probed(run, names, largest_n, next(iter(RUNGS)))
     for low, high in itertools.pairwise(RUNGS):
-        own, finer = said(low), said(high)
-        if own is None or finer is None:
+        coarser, own = own, _probed(run, names, largest_n, high)
+        if coarser is None or own is None:
             continue
-        error = _apart(own, finer)
+        error = float(np.max(np.abs(coarser - own)))
         if error <= (1 - TABLE_SHARE) * tolerance:
             return low, error
     last = list(RUNGS)[-1]
@@ -68,30 +58,26 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
         return last, error / 2
     raise RigError(
         f"No rung of the ladder keeps an error of {tolerance:g} here: the finest is off by about {error / 2:.2g}.",
-        hint="Ask for a larger tolerance, or a sensor spec with more cells.",
+        hint="Give a larger tolerance, or a sensor spec with more cells.",
     )
 
 
 def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> FloatArray | None:
-    """Return the readings at the probing loads, less those at rest, and where a slide is looked at in full slip, too.
+    """Return the changes of the readings at the probing loads, for an observed slide also in full slip.
 
-    None if the rung does not do this skin.
+    None if the rung does not support this skin.
     """
     try:
         press, read = pressed(run, names, RUNGS[name])
     except RigError:
         return None
     states = [press(share * largest_n) for share in _PROBES]
-    slide, skin = slide_of(run), run.sensor.spec.skin
-    if names and skin is not None and slide is not None:
+    slide = slide_of(run)
+    if names and slide is not None:
         from tactbench.rigs.twin.contact.slide_table import dragged_state
         from tactbench.rigs.twin.contact.tangential import tangential_of
 
-        along, (direction, friction) = tangential_of(skin, press.medium.grid), slide
+        along, (direction, friction) = tangential_of(run.skin, press.medium.grid), slide
         states += [dragged_state(state, state, along, direction, friction, 0.0) for state in states]
     rest = read(press(0.0))
     return np.stack([read(state) - rest for state in states])
-
-
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    return float(np.max(np.abs(one - other)))

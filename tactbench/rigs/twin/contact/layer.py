@@ -1,4 +1,4 @@
-"""A linear elastic layer bonded to a rigid base, frictionless on top: how it answers waves, and the medium it is."""
+"""A linear elastic layer bonded to a rigid base: its response to waves of pressure and traction, and its medium."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
 
 
 def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return how far the layer's surface moves along itself under waves: shapes of ``q = k h``, each over ``G k``.
+    """Return tangential compliances of the layer's surface under waves: shapes of ``q = k h``, each over ``G k``.
 
     - under pressure, along the wave: ``C = [(1-2nu) (3-4nu) (cosh 2q - 1) - 2q²] / 2D``. A wave of pressure
       ``p cos kx`` moves the surface by ``-C p sin kx / (G k)``: towards the pressed place where C > 0. C is 0.5 - nu

@@ -1,4 +1,4 @@
-"""Readings against load, solved at a few loads only.
+"""Tables of readings against load, solved at a few loads only.
 
 Quasi-static contact depends on time through the force alone. So the skin is solved at a few loads, all wanted readings
 are kept, and a shape-preserving cubic between the nodes answers for every sample. What an interpolant through all
@@ -19,7 +19,7 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import AnyPress, scalars
+from tactbench.rigs.twin.contact.press import AnyPress, scalars, whole_skin
 
 _SCOUTS = 4
 _SCOUTS_POWER = 1.7
@@ -35,11 +35,11 @@ _LARGEST_GAP = 1.3
 """A gap between nodes is split when it is wider than this many intervals."""
 _UNSEEN = 3.0
 """Safety of the reported bound: where readings bend sharply, just above touch-down, the error between two nodes has
-been up to 2.4 times what the nodes miss one another by."""
+been up to 2.4 times the largest such difference at a node."""
 _NARROWEST_N = 0.02
 """No interval narrower than this is split."""
 _TOUCH_DOWN_N = 0.01
-"""How closely the load is bracketed at which the film closes."""
+"""Width of the bracket of the load at which the film closes."""
 
 
 class SkinCurves(NamedTuple):
@@ -61,9 +61,9 @@ class LoadTable:
     states: tuple[SkinState, ...]
     """(n,) the skin at the nodes, without its fields."""
     touch_down_n: tuple[float, float] | None
-    """Bracket of the load at which the core is touched; None when it never is."""
+    """Bracket of the load at which the skin touches the core; None if it never does."""
     error: FloatArray
-    """(channels,) three times the most by which a solved reading differs from the interpolant through the others."""
+    """(channels,) three times the largest difference of a solved reading from the interpolant through the others."""
     interpolant: Interpolant
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
@@ -89,7 +89,7 @@ class LoadTable:
         return self.interpolant.steepest(float(low), float(high))
 
     def per_mm(self, of: Callable[[FloatArray], FloatArray], force_n: FloatArray) -> FloatArray:
-        """Return how (m, k) numbers `of` a force grow with depth at (n,) forces: (n, k), chords of a fiftieth."""
+        """Return the (n, k) slopes against depth, at (n,) forces, of a function `of` force: chords of a fiftieth."""
         nodes = np.linspace(0.0, float(self.loads_n[-1]), 51)
         deeper = np.diff(self.skin(nodes).depth_mm)
         risen = np.diff(of(nodes), axis=0)
@@ -98,7 +98,7 @@ class LoadTable:
         return np.column_stack([np.interp(force_n, middles, chord) for chord in chords])
 
     def skin(self, force_n: FloatArray) -> SkinCurves:
-        """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
+        """Return depth, contact radius and fluid pressure at (m,) forces, held at the ends of the table."""
         depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T
         return SkinCurves(depth_mm=depth, contact_radius_mm=radius, fluid_pressure_mpa=pressure)
 
@@ -118,7 +118,7 @@ class _Builder:
             began = self._clock()
             self.nodes[force] = (scalars(state), self._read(state))
             self.read_s += self._clock() - began
-            self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
+            self.closed[force] = force > 0 and self._press.closing_at(force) > 0
         return self.nodes[force][1]
 
     def interpolant(self, touch_down: tuple[float, float] | None, without: float | None = None) -> Interpolant:
@@ -127,19 +127,15 @@ class _Builder:
 
     def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
         loads = sorted(self.nodes)
-        return through(loads, [_scalars(self.nodes[load][0]) for load in loads], touch_down)
+        return through(loads, [whole_skin(self.nodes[load][0]) for load in loads], touch_down)
 
 
 def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
-    """Return what runs through (channels,) `values` at `loads`, with breaks where the core is touched."""
+    """Return the interpolant of (channels,) `values` at `loads`, with breaks where the skin touches the core."""
     if touch_down is None:
         return Interpolant(np.array(loads), np.stack(values))
     breaks = [loads.index(load) for load in touch_down]
     return Interpolant(np.array(loads), np.stack(values), breaks, _ABOVE_POWER)
-
-
-def _scalars(state: SkinState) -> FloatArray:
-    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def build_table(
@@ -258,7 +254,7 @@ def _split_gaps(builder: _Builder, start: float, end: float, intervals: int, pow
 def _refine(
     builder: _Builder, touch_down: tuple[float, float] | None, tolerance: FloatArray, most_nodes: int
 ) -> FloatArray:
-    """Split beside the node that the others predict worst, until all are predicted; return the bound achieved."""
+    """Add nodes beside the worst predicted one until all are predicted well; return the bound achieved."""
     while True:
         loads = sorted(builder.nodes)
         fixed = {loads[0], loads[-1], *(touch_down or ())}

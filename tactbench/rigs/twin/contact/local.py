@@ -1,7 +1,7 @@
-"""The cheapest rung: every cell answers for itself, as if the skin were a bed of springs (Winkler).
+"""The closed-form rung: the skin as a bed of independent springs (Winkler).
 
-Right for foams and thin compressible layers, where a neighbour hardly feels a neighbour; hopeless for rubber, whose
-volume has to go somewhere. So it refuses what it is known to be wrong for, instead of being quick and wrong.
+The model holds for foams and thin compressible layers, whose cells hardly influence each other. It refuses skins of
+nearly constant volume.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
-"""Above it springs are wrong: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
+"""Limit of the model: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
 to 19 %, least where the contact is wide beside the layer's thickness."""
 _CLOSED = 1e-12
 _STEPS = 60
@@ -26,14 +26,12 @@ class LocalPress:
 
     Parameters
     ----------
-    skin
-        As declared.
-    medium
-        The same on its grid.
+    skin, medium
+        The skin as declared, and on its grid.
     gap_mm
         (nx, ns) gap at zero approach.
     contact
-        Where the apex is.
+        Place of the apex.
 
     Raises
     ------
@@ -106,10 +104,6 @@ class LocalPress:
         )
 
     def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
         """Return minus infinity: there is no core."""
         return -np.inf
 

@@ -1,4 +1,4 @@
-"""What every skin medium offers the solver, a stiffness per Fourier mode and a local law."""
+"""The interface of skin media to the solver: a stiffness per Fourier mode and a local law."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 
 class LocalLaw(Protocol):
-    """A force law that looks at one cell at a time."""
+    """A force law of each cell by itself."""
 
     def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
         """Return the (nx, ns) restoring pressure [MPa] (a new array) and the summed energy density [N/mm].
@@ -32,19 +32,19 @@ class Medium:
     """(nx, ns//2+1) pressure per deflection of each mode [MPa/mm]."""
     respond: LocalLaw
     contact_stiffness: float
-    """Of the indenter against the skin [MPa/mm]."""
+    """Stiffness of the contact between indenter and skin [MPa/mm]."""
     zero_mean: bool
-    """The volume under the skin is constant: the mean deflection stays zero."""
+    """Whether the volume under the skin is constant, so that the mean deflection is zero."""
     rest_thickness_mm: FloatArray
-    """(nx, ns) film or layer with nothing touching."""
+    """(nx, ns) thickness of film or layer without contact."""
     least_thickness_mm: float
-    """What stays open when pressed flat; 0 where there is no such limit."""
+    """Film that remains when the skin is pressed flat; 0 where there is no such limit."""
     low_modes: int
     """Pairs of soft modes that the preconditioner solves exactly: chosen for speed, without effect on the result."""
     contact_updates: int = 0
-    """Times that what the indenter penetrates is taken back; 0 where the contact's stiffness is the skin's own."""
+    """Number of corrections for the penetration by the penalty; 0 where the contact stiffness is a skin property."""
     has_core: bool = False
-    """There is a core to touch down on when less than `least_thickness_mm` would be left."""
+    """Whether a core carries load when less than `least_thickness_mm` would be left."""
 
     def closing_mm(self, deflection_mm: FloatArray) -> float:
         """Return how far the skin passes the least film; above zero the core is touched."""
@@ -57,6 +57,6 @@ class Medium:
 
 
 def no_local_law(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-    """Answer for media whose whole stiffness is in the Fourier modes."""
+    """Return no pressure: the law of media whose whole stiffness is in the Fourier modes."""
     tangent.fill(0.0)
     return np.zeros_like(deflection_mm), 0.0

@@ -25,16 +25,16 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.preconditioner import Preconditioner
 
 TOLERANCE = 1e-6
-"""Largest relative residual of a solution that is handed out."""
+"""Largest relative residual of a solution that is returned."""
 ROUGH_TOLERANCE = 1e-3
-"""The same for passes whose pressure only lowers the gap of the next."""
+"""Largest relative residual of the passes before the last, whose pressure only lowers the gap of the next."""
 MAX_STEPS = 40
 """Newton steps before giving up; the hard cases of the tests take up to 25 from a cold start."""
 _ARMIJO = 1e-4
 _HALVINGS = 12
 _EPS = float(np.finfo(np.float64).eps)
 _BALANCED = 1e-12
-"""Relative force balance of what is handed out: rounding of a sum over thousands of cells."""
+"""Largest relative error of the force balance: the rounding of a sum over thousands of cells."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Solution:
     pressure_mpa: FloatArray
     """(nx, ns) contact pressure."""
     residual: float
-    """Of the field equation, relative to the load; the force balance holds to rounding."""
+    """Residual of the field equation relative to the load; the force balance holds to rounding."""
 
     @property
     def depth_mm(self) -> float:
@@ -57,7 +57,7 @@ class Solution:
 
 
 class NewtonSolver:
-    """Presses one medium through one gap.
+    """Solver of the contact of one medium through one gap.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class NewtonSolver:
             State of a neighbouring load (its ``vector``).
         tolerance
             Largest relative residual. Where rounding of the equations' terms alone is more, what rounding leaves is
-            handed out, up to :data:`TOLERANCE`; the solution's residual says so.
+            returned, up to :data:`TOLERANCE`; the solution's residual states it.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class NewtonSolver:
         """
         if not force_n > 0 or not math.isfinite(force_n):
             raise RigError(
-                f"The contact solver was asked for {force_n!r} N; it needs a finite force above zero.",
+                f"The contact solver was given {force_n!r} N; it needs a finite force above zero.",
                 hint="At zero force the skin is at rest and nothing is solved.",
             )
         self._gap = self.gap_mm
@@ -154,7 +154,7 @@ class NewtonSolver:
                 trial_energy, trial_gradient = self._evaluate(trial, load)
                 trial_residual = self._residual(trial_gradient, load)
                 # Near the solution, and at loads of nanonewtons, the energy's change drowns in its rounding while
-                # the gradient still tells: a step that halves the residual is taken as well.
+                # the gradient is still accurate: a step that halves the residual is taken as well.
                 if trial_energy <= energy + _ARMIJO * size * slope or trial_residual < 0.5 * residual:
                     break
                 size /= 2
@@ -193,7 +193,7 @@ class NewtonSolver:
         return (abs(float(gradient[-1])) + math.sqrt(float(field @ field))) / load
 
     def _rounding(self, vector: FloatArray, load: float) -> float:
-        """Return what rounding alone makes of the residual at the state last evaluated, relative to the load.
+        """Return the part of the residual that is rounding at the state last evaluated, relative to the load.
 
         The terms are the skin's own stiffness times its deflection, the contact's pressure, and what that pressure is
         the difference of: the contact's stiffness times the approach, and times gap and deflection, which are as large.
@@ -242,7 +242,7 @@ class NewtonSolver:
         """Return the Newton step for `gradient`, to a residual of `forcing` in the preconditioner's norm.
 
         It ends sooner, and keeps the step so far, at a direction along which the energy curves by no more than rounding
-        of what the preconditioner says: how far to go along it is not known, and dividing by it would overflow.
+        of the preconditioned value: the step length along it is undetermined, and dividing by it would overflow.
         """
         self._coupling = float(self._contact.sum())
         step = np.zeros_like(gradient)
@@ -273,7 +273,7 @@ class NewtonSolver:
         return step
 
     def _solution(self, force_n: float, vector: FloatArray, residual: float) -> Solution:
-        """Return the converged state, its approach moved by what the force balance still lacks.
+        """Return the converged state, with an approach that balances the force exactly.
 
         The residual summed both equations, so the field's stays below it.
         """

@@ -1,4 +1,4 @@
-"""What makes the inner CG short: the soft modes solved exactly, the stiff ones by their diagonal.
+"""Preconditioner of the conjugate gradients: soft modes solved exactly, stiff ones by their diagonal.
 
 A skin is stiff against short waves, so the contact's varying stiffness matters for long waves only. These few modes,
 together with the approach, form a small dense matrix that is factorised once per Newton step.
@@ -16,13 +16,7 @@ from tactbench.rigs.twin.contact.spectrum import LowModes
 
 
 class Preconditioner:
-    """Approximate inverse of the Hessian in deflection and approach.
-
-    Parameters
-    ----------
-    medium
-        The skin; its softest ``medium.low_modes`` pairs of modes are solved exactly.
-    """
+    """Approximate inverse of the Hessian in deflection and approach, with ``medium.low_modes`` exact pairs of modes."""
 
     def __init__(self, medium: Medium) -> None:
         from scipy.linalg import lapack

@@ -1,4 +1,4 @@
-"""Presses one skin with one indenter at any force, starting each solve from its neighbours."""
+"""Solution of one contact at any force, each solve starting from those at neighbouring forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOTHING = np.zeros((0, 0))
 
 
 class AnyPress(Protocol):
-    """What a load table asks of whatever solves its loads: one interface for every rung."""
+    """Interface of the solvers of loads, for every rung."""
 
     medium: Medium
     contact: Contact
@@ -31,12 +31,9 @@ class AnyPress(Protocol):
     def closing_at(self, force_n: float) -> float:
         """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
 
-    def closing_mm(self, state: SkinState) -> float:
-        """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
-
 
 def at_rest(medium: Medium) -> SkinState:
-    """Return the skin with nothing touching."""
+    """Return the state of the skin without contact."""
     zero = np.zeros(medium.spectrum.shape)
     return SkinState(
         grid=medium.grid,
@@ -52,8 +49,13 @@ def at_rest(medium: Medium) -> SkinState:
 
 
 def scalars(state: SkinState) -> SkinState:
-    """Return `state` without its fields: what a table keeps."""
+    """Return `state` without its fields, as a load table keeps it."""
     return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
+
+
+def whole_skin(state: SkinState) -> FloatArray:
+    """Return (3,) depth, contact radius and fluid pressure: what is tabulated where no channel is read."""
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray) -> float:
@@ -63,7 +65,7 @@ def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray
 
 
 class Press:
-    """Solves forces in any order.
+    """Solver of one contact for forces in any order.
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ class Press:
     contact
         Where the apex is.
     core
-        Gives the skin with its core; asked for only when a load closes the film. None: there is no core.
+        Function that adds the core to a skin, called when a load first closes the film; None: there is no core.
     fluid_pressure
         Whether states carry the pressure of the fluid.
     """
@@ -121,14 +123,12 @@ class Press:
         )
 
     def closing_at(self, force_n: float) -> float:
-        """Return how far the film is past closing under `force_n` [mm]; negative while it is open."""
+        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        if not self.medium.has_core:
+            return -np.inf
         if force_n <= 0:
             return self.medium.closing_mm(np.zeros(self.gap_mm.shape))
         return self.medium.closing_mm(self._solve(force_n).deflection_mm)
-
-    def closing_mm(self, state: SkinState) -> float:
-        """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
-        return self.medium.closing_mm(state.deflection_mm) if self.medium.has_core else -np.inf
 
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:

@@ -1,4 +1,4 @@
-"""What presses one recording's skin at a given fidelity, and what reads it."""
+"""Solver and transducer of one recording's skin at a given fidelity."""
 
 from __future__ import annotations
 
@@ -21,16 +21,15 @@ from tactbench.plugin.simulation import (
     BondedLayer,
     FluidBackedShell,
     FoamPad,
-    Skin,
     SkinGrid,
     SkinState,
     Transducer,
     TransducerFactory,
 )
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import AnyPress, Press
+from tactbench.rigs.twin.contact.press import AnyPress, Press, whole_skin
 from tactbench.rigs.twin.fidelity import Fidelity
-from tactbench.rigs.twin.geometry import gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.geometry import gap_mm, skin_grid, surface_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
 Read = Callable[[SkinState], FloatArray]
@@ -40,12 +39,12 @@ _MAY_BE_ZERO = frozenset({
 
 
 def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPress, Read]:
-    """Return what solves the loads of `run` and what reads the channels in `names` from a solved skin.
+    """Return the solver of the loads of `run`, and the function that reads the channels `names` from a solved skin.
 
     Raises
     ------
     NotApplicable
-        If the sensor has no skin or transducer, or its transducer cannot give a channel.
+        If the transducer cannot give a channel.
     RigError
         If this rung is known to be wrong for this skin.
     """
@@ -54,10 +53,10 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
 
 
 def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
-    """Return what reads the channels in `names` from a solved skin of `run`; raises as :func:`pressed`."""
-    skin = _skin(run)
+    """Return the function that reads the channels `names` from a solved skin of `run`; raises as :func:`pressed`."""
     if not names:
-        return no_channels
+        return whole_skin
+    skin = run.skin
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     read = _reader(run.sensor, grid, names, fidelity)
     if not (run.tangential or run.sensor.spec.reads_shear):
@@ -68,18 +67,11 @@ def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
     return lambda state: read(state if state.shear_mpa is not None else pressed_state(state, along))
 
 
-def _skin(run: Synthesis) -> Skin:
-    spec = run.sensor.spec
-    if spec.skin is None or run.sensor.transducer is None:
-        raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
-    return spec.skin
-
-
 def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
-    """Return what solves the loads of `run`; raises as :func:`pressed`."""
-    skin = _skin(run)
+    """Return the solver of the loads of `run`; raises as :func:`pressed`."""
+    skin = run.skin
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    gap = gap_mm(grid, run.contact, *surface_of(skin.sheet))
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress
 
@@ -105,7 +97,7 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
 def _reader(
     sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
 ) -> Callable[[SkinState], FloatArray]:
-    """Return the sensor's transducer, each of its answers looked at before it is used."""
+    """Return the sensor's transducer, with a check of each result."""
     try:
         factory: TransducerFactory = load_object(sensor.transducer or "")
         transducer: Transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
@@ -132,11 +124,6 @@ def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
         return None
     angle = slide.direction.to("rad")
     return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")
-
-
-def no_channels(state: SkinState) -> FloatArray:
-    """Return depth, contact radius and fluid pressure: what is looked at when no channel is."""
-    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:

@@ -1,4 +1,4 @@
-"""What a tangential force adds to the readings of one contact, tabulated over both forces.
+"""Change of the readings of one contact by a tangential force, tabulated over both forces.
 
 The traction of a contact pressed by P that carries Q along a slide is, after Cattaneo and Mindlin in the general form
 of Ciavarella (1998) and Jaeger (1998), the difference of two contacts without friction:
@@ -26,9 +26,9 @@ from tactbench.rigs.twin.contact.press import AnyPress
 from tactbench.rigs.twin.contact.tangential import Direction, TangentialResponse, tangential_of
 
 _SHARES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Of mu P, carried by a traction in proportion to the pressure; at 0 nothing is added."""
+"""Shares of mu P carried by a traction proportional to the pressure; a share of 0 changes nothing."""
 _PUSHES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-"""Of mu P, by a first push; at its ends all sticks or all slips: a traction in proportion, too."""
+"""Shares of mu P of a first push; at 0 and 1 the traction is proportional to the pressure, too."""
 
 
 def traction_shares(
@@ -70,10 +70,10 @@ def dragged_state(
 
 @dataclass(frozen=True)
 class SlideTable:
-    """What a slide in one direction over one surface adds to the readings."""
+    """Change of the readings by a slide in one direction over one surface."""
 
     friction: float
-    """mu, the static one."""
+    """Static friction coefficient mu."""
     proportional: Interpolant
     """(m,) loads -> (m, shares * channels): readings under a share of the pressure, less those without."""
     partial: Interpolant
@@ -82,7 +82,7 @@ class SlideTable:
     def __call__(
         self, force_n: FloatArray, load_n: FloatArray, tangential_n: FloatArray, stick_ratio: FloatArray
     ) -> FloatArray:
-        """Return the (n, channels) that is added to the readings.
+        """Return the (n, channels) change of the readings.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ def build_slide_table(
     direction: Direction,
     friction: float,
 ) -> SlideTable:
-    """Return what a slide adds, at the loads of `table`; `press` and `read` are those it was made with."""
+    """Return the slide table at the loads of `table`, which was made with the same `press` and `read`."""
     along = tangential_of(skin, press.medium.grid)
     proportional, partial = [], []
     for load, plain in zip(table.loads_n.tolist(), table.readings, strict=True):

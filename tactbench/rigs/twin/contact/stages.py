@@ -1,9 +1,8 @@
-"""The effects of contact as stages of a synthesis: press, look at the fluid, read the skin."""
+"""The effects of contact: pressing the skin, and reading the channels from it."""
 
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,19 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable, Scalar
+from tactbench.plugin import FloatArray, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import check_contact, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
 if TYPE_CHECKING:
     from tactbench.rigs.twin.contact.slide_table import SlideTable
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
-"""Kinds of channels a sensor's transducer answers for."""
+"""Kinds of channels that a sensor's transducer computes."""
 _MOST_TABLES = 64
 
 
@@ -33,7 +32,6 @@ class _Tabulated:
     slide: SlideTable | None
     touched_core: bool
     closing_mm: float
-    film_mm: float
     remarks: Mapping[str, Scalar]
 
 
@@ -42,10 +40,8 @@ _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
 
 def press_skin(run: Synthesis) -> None:
     """Refuse a contact that cannot be resolved; it is solved when a reading is first needed."""
-    skin = run.sensor.spec.skin
-    if skin is None:
-        raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
-    check_contact(skin_grid(skin.sheet, run.fidelity.cells(skin.sheet)), run.contact)
+    sheet = run.skin.sheet
+    check_contact(skin_grid(sheet, run.fidelity.cells(sheet)), run.contact)
 
 
 def forget_tables() -> None:
@@ -54,12 +50,12 @@ def forget_tables() -> None:
 
 
 def watch_fluid(run: Synthesis) -> None:
-    """Ask for the pressure of the fluid with every solved load."""
+    """Request the pressure of the fluid with every solved load."""
     run.fluid_pressure = True
 
 
 def watch_shear(run: Synthesis) -> None:
-    """Ask for what the skin does along itself with every solved load."""
+    """Request the tangential state of the skin with every solved load."""
     run.tangential = True
 
 
@@ -89,16 +85,16 @@ def read_skin(run: Synthesis) -> None:
 
 
 def skin_under_load(run: Synthesis) -> LoadTable:
-    """Return what the skin and the channels read from it do under any load of this recording; solved once.
+    """Return the load table of this recording's skin and channels; it is solved once.
 
-    Whether the fluid's pressure belongs to it must be settled before it is first asked for.
+    The table holds the fluid's pressure only if that was requested before the first call.
     """
     return _tables(run).table
 
 
 def _tables(run: Synthesis) -> _Tabulated:
     largest, names = run.load.largest_n, read_names(run)
-    if run.scene.simulation.tolerance is not None and run.rung_error is None:
+    if run.rung_error is None:
         choose_rung(run, names, largest)
     tabulated = _tabulated(run, names, largest)
     _report(run, tabulated)
@@ -108,7 +104,7 @@ def _tables(run: Synthesis) -> _Tabulated:
 def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
     """Return the radius of the contact under (n,) forces, for laws of a round contact.
 
-    Of a contact that is not round it is that of a circle whose load is as far from its middle; the recording says so.
+    Of other contacts it is that of a circle with the same mean square distance of the load, and a remark states so.
     """
     if run.contact.shape is not None:
         run.drawn["remark round"] = (
@@ -119,9 +115,9 @@ def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
 
 
 def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
-    """Return what the skin alone does up to a load, no channel read: for those who decide upon the load.
+    """Return the load table of the skin up to a load, without channels: for effects that determine the load.
 
-    It may end beyond the reach of a cap: whether the load that is decided upon does is looked at when the skin is read.
+    It may reach past the rim of a cap: the final load is checked when the channels are read.
     """
     return _tabulated(run, [], largest_n, only_skin=True).table
 
@@ -132,9 +128,9 @@ def read_names(run: Synthesis) -> list[str]:
 
 
 def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: bool = False) -> _Tabulated:
-    spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
+    spec, tolerance = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
-        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
+        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
         f"|{run.tangential}|{slide_of(run)}"
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
@@ -156,7 +152,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
 
 
 def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> tuple[_Tabulated, float]:
-    """Return the table, and the seconds that preparing to read the skin and reading it took."""
+    """Return the table, and the seconds spent on preparing the transducer and reading the skin."""
     fidelity = run.fidelity
     press = press_of(run, fidelity)
     began = run.clock()
@@ -170,31 +166,25 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
-    slide, skin = slide_of(run), run.sensor.spec.skin
+    slide = slide_of(run)
     began = run.clock()
     sliding = None
-    if names and skin is not None and slide is not None:
+    if names and slide is not None:
         from tactbench.rigs.twin.contact.slide_table import build_slide_table
 
-        sliding = build_slide_table(press, read, table, skin, *slide)
+        sliding = build_slide_table(press, read, table, run.skin, *slide)
     slide_s = run.clock() - began
-    medium = press.medium
-    closing = press.closing_at(largest) if medium.has_core else 0.0
-    film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
-    sheet = None if skin is None else skin.sheet
-    outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)
-    dome, relief = (None, None) if sheet is None else (sheet.dome, sheet.relief)
+    closing = press.closing_at(largest)
     if within_reach:
-        check_reach(press, largest, outer_mm, dome, relief)
-    pad = None if sheet is None else pad_of(sheet, medium.grid)
-    said = remarks(press, table.loads_n.tolist(), outer_mm, pad, dome, relief)
-    tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, said)
+        check_reach(press, largest, run.skin.sheet)
+    remarked = remarks(press, table.loads_n.tolist(), run.skin.sheet)
+    tabulated = _Tabulated(table, sliding, press.touched_core, closing, remarked)
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
-"""Depth and contact radius [mm] and pressure [MPa] where no channel says how closely the skin must be known: a
-hundredth of what a ramp to a few newtons gives."""
+"""Tolerances of depth and contact radius [mm] and of pressure [MPa] where no channel determines one: a hundredth of
+their values under a few newtons."""
 
 
 def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
@@ -214,8 +204,8 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         bounds.append(hidden if hidden > 0 else 1e-4 * span)
     aim = run.fidelity.table_tolerance_factor * np.array(bounds)
-    asked = run.scene.simulation.tolerance
-    return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
+    tolerance = run.scene.simulation.tolerance
+    return aim if tolerance is None else np.minimum(aim, TABLE_SHARE * tolerance)
 
 
 def _report(run: Synthesis, tabulated: _Tabulated) -> None:
@@ -234,16 +224,10 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         run.drawn.update(rung=run.rung, rung_error_count=run.rung_error, error_estimate_count=total)
     if "core" not in run.lent:
         return
-    force = deepest.force_n
     if table.touch_down_n is not None:
         low, high = table.touch_down_n
         run.drawn["touch_down_n"] = (low + high) / 2
         run.settled["core"] = Settled(True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N", None)
     elif not tabulated.touched_core:
-        sure = deepest.depth_mm < tabulated.film_mm
-        number = (
-            f"depth {deepest.depth_mm:.2f} mm < {tabulated.film_mm:.2f} mm"
-            if sure
-            else f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
-        )
-        run.settled["core"] = Settled(False, f"never touches the core below {force:g} N: {number}")
+        left = f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
+        run.settled["core"] = Settled(False, f"never touches the core below {deepest.force_n:g} N: {left}")

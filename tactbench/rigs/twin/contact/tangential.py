@@ -1,4 +1,4 @@
-"""How a skin's outer surface moves along itself: what a press squeezes out, and where a traction drags it.
+"""Tangential displacement of a skin's outer surface under pressure and under traction.
 
 The answer is linear in pressure and traction. That a traction also lifts the surface, and so changes the pressure, is
 neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an incompressible layer.
@@ -7,7 +7,6 @@ neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,52 +20,45 @@ Direction = tuple[float, float]
 """Unit vector along x and s."""
 
 
-class TangentialResponse(Protocol):
-    """A skin's answer along its surface."""
+class TangentialResponse:
+    """Tangential response of a skin; here that of a contact that moves as a whole, while the skin around it stays.
 
-    def pressed(self, state: SkinState) -> FloatArray:
-        """Return the (2, nx, ns) displacement [mm] of a pressed skin without friction."""
-
-    def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
-        """Return the (2, nx, ns) displacement [mm] under a traction of the size of the contact pressure.
-
-        `touched` (nx, ns) is the whole contact, of which `state` may hold but the inner part's pressure.
-        """
-
-
-def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
-    """Return what moves the surface of `skin` along itself."""
-    if isinstance(skin, BondedLayer):
-        return _Layer(skin, grid)
-    return _Shell(skin, grid) if isinstance(skin, FluidBackedShell) else _Patch(skin)
-
-
-def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
-    """Return `state` with what a press without friction does along the surface, and no traction.
-
-    None: no channel looks, or the scene leaves it out; nothing moves.
-    """
-    moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
-    return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))
-
-
-class _Patch:
-    """A contact that moves as a whole, by the force over the half-space's stiffness; the skin around it stays.
-
-    So does `friction` move it. A foam of independent columns is pressed straight down.
+    Its displacement is the force over the half-space's stiffness, as for `friction`. A press moves nothing, as in a
+    foam of independent columns.
     """
 
     def __init__(self, skin: Skin) -> None:
         self._shear_mpa = shear_modulus_mpa(skin)
 
     def pressed(self, state: SkinState) -> FloatArray:
+        """Return the (2, nx, ns) displacement [mm] of a pressed skin without friction."""
         return np.zeros((2, *state.pressure_mpa.shape))
 
     def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
+        """Return the (2, nx, ns) displacement [mm] under a traction of the size of the contact pressure.
+
+        `touched` (nx, ns) is the whole contact; `state` may hold the pressure of its inner part alone.
+        """
         if not state.force_n > 0:
             return np.zeros((2, *touched.shape))
         stiffness = sliding_stiffness(np.array(state.contact_radius_mm), self._shear_mpa)
         return np.asarray(np.multiply.outer(np.array(direction), state.force_n / stiffness * touched))
+
+
+def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
+    """Return the tangential response of `skin`."""
+    if isinstance(skin, BondedLayer):
+        return _Layer(skin, grid)
+    return _Shell(skin, grid) if isinstance(skin, FluidBackedShell) else TangentialResponse(skin)
+
+
+def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
+    """Return `state` with the tangential displacement of a frictionless press, and no traction.
+
+    Without a tangential response (`along` is None) the displacement is zero.
+    """
+    moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
+    return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))
 
 
 class _Spectral:
@@ -93,7 +85,7 @@ class _Spectral:
         return np.asarray(np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells])
 
 
-class _Shell(_Patch):
+class _Shell(TangentialResponse):
     """The shallow shell's own membrane displacements, and the turn of its normal at the outer face.
 
     Donnell: ``k⁴ u = i kx (ks² - nu kx²) w / R``, ``k⁴ v = -i ks (ks² + (2 + nu) kx²) w / R`` for a deflection w
@@ -113,7 +105,7 @@ class _Shell(_Patch):
         return self._waves.filtered(state.deflection_mm, self._moved)
 
 
-class _Layer:
+class _Layer(TangentialResponse):
     """A layer bonded to a rigid base: closed forms wave by wave (:func:`shear_shapes`)."""
 
     def __init__(self, skin: BondedLayer, grid: SkinGrid) -> None:

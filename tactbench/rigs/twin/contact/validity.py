@@ -1,7 +1,4 @@
-"""Where a solved contact leaves the ground the model stands on: refused where it is not one, remarked on otherwise.
-
-Everything here is looked at once, at a scene's largest load, and kept with the recording.
-"""
+"""Limits of the contact model: checks that refuse a solved contact, and remarks that its recording keeps."""
 
 from __future__ import annotations
 
@@ -12,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError, Scalar
-from tactbench.plugin.simulation import Dome, SheetTable
+from tactbench.plugin.simulation import SkinGrid, SkinSheet
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import STEEPEST, around_mm
+from tactbench.rigs.twin.geometry import STEEPEST, around_mm, surface_of
 from tactbench.rigs.twin.shapes import RIM
 
 RESOLVED_CELLS = 3.0
@@ -27,17 +24,11 @@ HELD_AGAINST_N = 5.0
 INTO_THE_CORE = 0.1
 """Share of the film by which the skin may pass into the core: its penalty is softer than a core. Assumed."""
 AT_THE_EDGE = 0.01
-"""Share of the load outside the active skin that is still no remark. Assumed."""
+"""Share of the load outside the active skin above which there is a remark. Assumed."""
 
 
-def check_reach(
-    press: AnyPress,
-    force_n: float,
-    outer_radius_mm: float,
-    dome: Dome | None = None,
-    relief: SheetTable | None = None,
-) -> None:
-    """Refuse a load under which the skin is touched where the cap no longer exists; the skin's surface as in `gap_mm`.
+def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
+    """Refuse a load under which the skin touches beyond the rim of the cap.
 
     Raises
     ------
@@ -46,7 +37,7 @@ def check_reach(
     """
     if not force_n > 0 or math.isinf(press.contact.radius_mm):
         return
-    along, across, _ = around_mm(press.medium.grid, press.contact, outer_radius_mm, dome, relief)
+    along, across, _ = around_mm(press.medium.grid, press.contact, *surface_of(sheet))
     if np.any(press(force_n).pressure_mpa[np.hypot(along, across) >= RIM * press.contact.radius_mm] > 0):
         raise RigError(
             f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks in past its rim: what would "
@@ -55,26 +46,8 @@ def check_reach(
         )
 
 
-def remarks(
-    press: AnyPress,
-    loads_n: Iterable[float],
-    outer_radius_mm: float,
-    pad: npt.NDArray[np.bool_] | None = None,
-    dome: Dome | None = None,
-    relief: SheetTable | None = None,
-) -> dict[str, Scalar]:
-    """Return what a reader of this contact must know, at the largest of `loads_n`.
-
-    Parameters
-    ----------
-    press
-        The contact; `loads_n` have been solved with it.
-    outer_radius_mm
-        Radius of the finger's outer surface; infinite for a flat pad.
-    pad
-        (nx, ns) active skin; None: all of it but the outermost cells.
-    dome, relief
-        Of the finger's surface, as for `gap_mm`.
+def remarks(press: AnyPress, loads_n: Iterable[float], sheet: SkinSheet) -> dict[str, Scalar]:
+    """Return remarks on the validity of a contact on `sheet` at the largest of `loads_n`, which `press` has solved.
 
     Returns
     -------
@@ -103,7 +76,7 @@ def remarks(
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
     found |= _too_deep(press.medium, press(force).deflection_mm)
-    along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, outer_radius_mm, dome, relief))
+    along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, *surface_of(sheet)))
     along, across = along[pressure > 0], across[pressure > 0]
     radius, reach = press.contact.radius_mm, float(np.hypot(along, across).max())
     if shape is not None:
@@ -115,9 +88,9 @@ def remarks(
             f"the contact reaches {reach:.2g} mm from the axis of a cap of radius {radius:g} mm, where its flank is "
             "steeper than 45 degrees"
         )
-    if dome is not None and press.contact.x_mm > dome.start.to("mm"):
+    if sheet.dome is not None and press.contact.x_mm > sheet.dome.start.to("mm"):
         found["remark dome"] = "the contact is on the dome, where the model has been held against no real press"
-    share = float(pressure[~_active(pressure.shape, pad)].sum() / pressure.sum())
+    share = float(pressure[~_active(sheet, press.medium.grid)].sum() / pressure.sum())
     if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"
     return found
@@ -134,12 +107,16 @@ def _narrow_cells(pressure: FloatArray) -> float:
     return 2.0 * math.sqrt(float(np.linalg.eigvalsh(scatter)[0]))
 
 
-def _active(shape: tuple[int, ...], pad: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.bool_]:
-    if pad is not None:
-        return pad
-    inner = np.zeros(shape, dtype=bool)
-    inner[1:-1, 1:-1] = True
-    return inner
+def _active(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_]:
+    """Return which (nx, ns) cells are active skin: those of the pad, or without one all but the outermost."""
+    x_mm, s_mm = grid.x_mm, np.abs(grid.s_mm)
+    if sheet.pad is None:
+        along, across = (x_mm > x_mm[0]) & (x_mm < x_mm[-1]), s_mm < s_mm[-1]
+    else:
+        low, high, arc = (edge.to("mm") for edge in sheet.pad)
+        along, across = (x_mm >= low) & (x_mm <= high), s_mm <= arc / 2
+    active: npt.NDArray[np.bool_] = along[:, None] & across[None, :]
+    return active
 
 
 def _too_deep(medium: Medium, deflection_mm: FloatArray) -> dict[str, Scalar]:

@@ -1,1 +1,1 @@
-"""What comes between the scene and the skin, and between the skin and the stored number: one effect per file."""
+"""Effects of the twin other than contact: on the load, on the skin and on the readings."""

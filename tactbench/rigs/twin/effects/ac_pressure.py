@@ -5,33 +5,31 @@ from __future__ import annotations
 import math
 
 from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable
-from tactbench.rigs.twin.contact.load_table import LoadTable
 from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.synthesis import Synthesis
 
 
 def apply(run: Synthesis) -> None:
-    """Add to every channel of dynamic pressure what its band lets through.
+    """Add the band-passed pressure of the fluid to every channel of dynamic pressure.
 
     The fluid's pressure follows the load; a vibration of the skin adds its size times the pressure's slope with depth
     at that load, so that its loudness needs no parameter of its own.
     """
+    table = skin_under_load(run)
     for track in run.tracks:
-        columns = track.by_kind().get("ac_pressure")
-        if not columns:
-            continue
-        table = skin_under_load(run)
+        columns = track.by_kind().get("ac_pressure", [])
         pressure_mpa = table.skin(track.force_n).fluid_pressure_mpa
         if track.vibration_mm is not None:
-            pressure_mpa = pressure_mpa + stiffness_mpa_mm(table, track.force_n) * track.vibration_mm
+            slope = table.per_mm(lambda loads_n: table.skin(loads_n).fluid_pressure_mpa[:, None], track.force_n)
+            pressure_mpa = pressure_mpa + slope[:, 0] * track.vibration_mm
         for column in columns:
             channel = track.channels[column]
             track.readings[:, column] += within_band(track.t_s, 1e6 * pressure_mpa, channel) / _pa_per_count(channel)
 
 
 def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
-    """Return what a band lets through of (n,) pressures that are straight between samples.
+    """Return (n,) pressures, linear between samples, filtered by the band of a channel.
 
     A first-order high-pass and a first-order low-pass with their corners at the band's ends: the makers state the
     ends, no source the order. Both are exact for any step.
@@ -44,12 +42,6 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
     low, high = channel.band.lower, channel.band.upper
     passed = pressure_pa - lag(t_s, pressure_pa, 1.0 / (2.0 * math.pi * low))
     return lag(t_s, passed, 1.0 / (2.0 * math.pi * high))
-
-
-def stiffness_mpa_mm(table: LoadTable, force_n: FloatArray) -> FloatArray:
-    """Return (n,) how the fluid's pressure grows with depth at (n,) loads."""
-    slope: FloatArray = table.per_mm(lambda loads_n: table.skin(loads_n).fluid_pressure_mpa[:, None], force_n)[:, 0]
-    return slope
 
 
 def _pa_per_count(channel: ChannelSpec) -> float:

@@ -16,7 +16,7 @@ from tactbench.rigs.twin.effects.memory import recurrence
 COULOMB_MM_S = 1e-6
 """Below this Stribeck speed friction falls at once: nothing measured is slower."""
 NOTHING_MM = 1e-12
-"""A deflection below this, a femtometre, is none."""
+"""Deflections below this, a femtometre, count as zero."""
 
 
 def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s: float) -> float:

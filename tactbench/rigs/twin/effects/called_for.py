@@ -1,6 +1,7 @@
-"""Which effects a scene calls for, each with its reason and what leaving it out would change: one list, no solves.
+"""Predicates that decide which effects a scene calls for, without solving a contact.
 
-Each predicate takes the scene and the sensor's spec and answers with a Reason that carries a number where there is one.
+Each takes the scene and the sensor's spec and returns a Reason: the decision, its text, and a bound on what leaving the
+effect out would change.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _HEATED: tuple[ChannelKind, ...] = ("taxel", "dc_temperature", "ac_temperature")
 
 
 def _no(text: str, unit: str = "count") -> Reason:
-    """Return that leaving an effect out changes nothing, and why."""
+    """Return the reason of an effect that changes nothing."""
     return Reason(False, text, 0.0, unit)
 
 
@@ -29,7 +30,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> list[Nuisances]:
 
 
 def _largest(scene: Scene, sensor: SensorSpec, *fields: str) -> Quantity | None:
-    """Return the largest that the spec states in these fields for the observed kinds; None where it states none."""
+    """Return the largest quantity in these fields of the observed kinds' nuisances; None if the spec states none."""
     found = [getattr(nuisances, field) for nuisances in _observed(scene, sensor) for field in fields]
     return max((one for one in found if one is not None), key=lambda quantity: quantity.value, default=None)
 
@@ -42,39 +43,30 @@ def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason
     return Reason(True, f"{text.format(size)}, scaled by {scale:g}", scale * size.value, size.unit)
 
 
-def _unpressed(scene: Scene, sensor: SensorSpec, no_skin: str = "declares no skin") -> str | None:
-    """Return why nothing presses a skin; None if it may."""
-    if sensor.skin is None:
-        return f"{sensor.name} {no_skin}"
-    return None if scene.profile.largest_n > 0 else NO_LOAD
-
-
 # The press and what reads it.
 
 
 def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a motor has to bring the force about."""
+    """Return whether a motor under force control presses."""
     drive = scene.drive
     if drive is None:
         return _no("the scene declares no drive: the force follows its profile, 0 N off", "N")
-    idle = _unpressed(scene, sensor, "declares no skin to press on")
-    if idle is not None:
-        return _no(idle, "N")
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD, "N")
     filtered = "unfiltered" if drive.cutoff is None else f"behind a low-pass at {drive.cutoff}"
     steps = "a step per sample" if drive.rate is None else f"steps at {drive.rate}"
     return Reason(True, f"a motor presses by the measured force, {filtered}, {drive.delay} late, {steps}", None, "N")
 
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the skin is pressed."""
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    """Return whether the skin is pressed."""
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     return Reason(True, f"{scene.indenter} pressed with up to {scene.profile.largest_n:g} N")
 
 
 def core(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the skin may touch down on a core."""
+    """Return whether the skin may touch a core under a fluid film."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return _no("the skin has no core under a fluid film")
     if not scene.profile.largest_n > 0:
@@ -84,17 +76,16 @@ def core(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether there is a fluid whose pressure can be looked at."""
+    """Return whether the skin holds a fluid whose pressure a channel reads."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return _no(NO_FLUID)
     return Reason(True, "an observed channel reads the pressure of the fluid")
 
 
 def shear(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether an observed channel looks at what the skin does along itself."""
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    """Return whether an observed channel reads the tangential state of the skin."""
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
         return _no("no observed channel looks along the skin")
@@ -103,10 +94,10 @@ def shear(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a response may lag behind a load that changes.
+    """Return whether a response may lag behind a load that changes.
 
-    By how much depends on how steep the readings are, and that only the scene's own load table says: creep is settled
-    when the skin is solved (`tactbench.rigs.twin.effects.creep`).
+    The amount depends on the slope of the readings, which only the scene's load table gives: the effect itself decides
+    after the skin is solved (`tactbench.rigs.twin.effects.creep`).
     """
     terms = [term for nuisances in _observed(scene, sensor) for term in nuisances.creep]
     share = sum(term.fraction.to("1") for term in terms)
@@ -123,9 +114,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the sensor has a skin to read."""
-    if sensor.skin is None:
-        return _no(f"{sensor.name} declares no skin")
+    """Return that the observed channels read the skin."""
     return Reason(True, f"{sensor.principle} channels read the skin")
 
 
@@ -133,7 +122,7 @@ def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether channels of one unit have different gains."""
+    """Return whether channels of one unit have different gains."""
     scatter = _largest(scene, sensor, "gain_scatter")
     unit = None if scene.first_unit else _largest(scene, sensor, "unit_gain")
     within, between = (0.0 if one is None else one.to("1") for one in (scatter, unit))
@@ -144,7 +133,7 @@ def gain(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether another unit rests at other levels than the spec states."""
+    """Return whether another unit rests at other levels than the spec states."""
     if scene.first_unit:
         return _no("unit 1 is the one that the spec describes")
     largest = _largest(scene, sensor, "unit_rest_shared", "unit_rest_own")
@@ -154,7 +143,7 @@ def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether channels of one unit rest at different levels."""
+    """Return whether channels of one unit rest at different levels."""
     spread = sensor.parameters.get("rest_spread")
     if spread is None or not spread.value:
         return _no("the spec states rest levels channel by channel")
@@ -162,7 +151,7 @@ def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def offset(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether recordings start from different levels."""
+    """Return whether recordings start from different levels."""
     environment, session = scene.environment, _largest(scene, sensor, "offset_session")
     if session is not None and session.value and environment.session_offset_scale:
         return _scaled(environment.session_offset_scale, session, "offset", "levels move by {} (sd) between sessions")
@@ -172,7 +161,7 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether rest levels rise to a warm value."""
+    """Return whether rest levels rise to a warm value."""
     rise, tau = _largest(scene, sensor, "warm_up"), _largest(scene, sensor, "warm_up_tau")
     reason = _scaled(scene.environment.drift_scale, rise, "warm-up", "rest levels rise by {} from power-on")
     if not reason.called_for or tau is None or reason.change is None:
@@ -182,19 +171,18 @@ def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether channels drift freely."""
+    """Return whether channels drift freely."""
     spread = _largest(scene, sensor, "wander")
     return _scaled(scene.environment.drift_scale, spread, "free drift", "channels wander by {} (sd)")
 
 
 def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether every sample has its own error."""
-    reason = _scaled(scene.environment.noise_scale, _largest(scene, sensor, "white"), "white noise", "noise of {} (sd)")
-    return reason if reason.called_for or scene.environment.noise_scale else _no("the scene scales noise by 0")
+    """Return whether every sample has its own error."""
+    return _scaled(scene.environment.noise_scale, _largest(scene, sensor, "white"), "white noise", "noise of {} (sd)")
 
 
 def hum(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether dynamic pressure hums at rest."""
+    """Return whether dynamic pressure hums at rest."""
     size = sensor.parameters.get("hum")
     if "ac_pressure" not in scene.observe:
         return _no("no channel of dynamic pressure is observed")
@@ -208,7 +196,7 @@ def hum(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def converter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer that readings are always stored through the converter."""
+    """Return that readings are always stored through the converter."""
     step = _largest(scene, sensor, "step")
     stated = f"steps of {step}, " if step is not None and step.value else ""
     half = None if step is None else step.value / 2
@@ -216,7 +204,7 @@ def converter(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the reference force differs from the true one."""
+    """Return whether the reference force differs from the true one."""
     noise = scene.environment.force_noise
     if not noise.value:
         return _no("the scene's force sensor is free of noise", "N")
@@ -224,7 +212,7 @@ def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def force_filter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the reference force is recorded behind a low-pass."""
+    """Return whether the reference force is recorded behind a low-pass."""
     cutoff = scene.environment.force_filter
     if cutoff is None:
         return _no("the force is recorded unfiltered: no cut-off, 0 N off", "N")
@@ -238,9 +226,8 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
     slide = scene.slide
     if slide is None:
         return _no("no tangential motion: the scene does not slide")
-    idle = _unpressed(scene, sensor)
-    if idle is not None:
-        return _no(idle)
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
     late = slide.start.to("s") - scene.profile.duration.to("s")
     if late >= 0:
         return _no(f"the slide would start {late:g} s after the recording's end")
@@ -248,7 +235,7 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def friction(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether something moves over the skin under a load."""
+    """Return whether something moves over the skin under a load."""
     found = _slides(scene, sensor)
     if not found.called_for or scene.slide is None:
         return found
@@ -257,7 +244,7 @@ def friction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether slip shakes the skin."""
+    """Return whether a slide over a rough surface makes the skin vibrate."""
     found = _slides(scene, sensor)
     if not found.called_for or scene.slide is None:
         return found
@@ -267,7 +254,7 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a channel of what a band lets through of a fluid's pressure is observed."""
+    """Return whether a channel of dynamic fluid pressure is observed."""
     if "ac_pressure" not in scene.observe:
         return _no("no channel of dynamic pressure is observed")
     if not isinstance(sensor.skin, FluidBackedShell):
@@ -282,12 +269,12 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a channel of a thermistor that the spec describes is observed."""
+    """Return whether a channel of a thermistor that the spec describes is observed."""
     return _thermistor(scene, sensor, "dc_temperature", THERMISTOR)
 
 
 def ac_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a channel of the rate of such a thermistor is observed."""
+    """Return whether a channel of the rate of such a thermistor is observed."""
     return _thermistor(scene, sensor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
 
 
@@ -302,7 +289,7 @@ def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tup
 
 
 def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether a contact warms or cools the core by more than an observed channel would hide.
+    """Return whether a contact warms or cools the core by more than an observed channel would hide.
 
     Behind a contact of conductance G the core follows the indenter, D kelvin away, by at most ``D G t / C`` and never
     by more than D. G is at most that of a contact whose whole load stands as far out as the cap or the sheet allows.
@@ -322,7 +309,7 @@ def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def thermal_drift(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether resistive channels follow a core that the contact warms or cools."""
+    """Return whether resistive channels follow a core that the contact warms or cools."""
     if "taxel" not in scene.observe:
         return _no(NOT_OBSERVED)
     if "conductivity_coefficient" not in sensor.parameters:
@@ -348,7 +335,7 @@ def _above_the_noise(counts: dict[ChannelKind, float], text: str, scene: Scene, 
 
 
 def _no_heat(scene: Scene, sensor: SensorSpec) -> str | None:
-    """Return why no heat can flow through the contact at all; None if it may."""
+    """Return the reason why no heat can flow through the contact, or None."""
     missing = [name for name in (*NEEDED, "contact_conductivity") if name not in sensor.parameters]
     if missing:
         return f"the spec states no {', '.join(missing)}"
@@ -372,7 +359,7 @@ def _difference_k(scene: Scene, sensor: SensorSpec) -> float:
 
 
 def widest_contact_mm(scene: Scene, sheet: SkinSheet) -> float:
-    """Return what a contact's radius is never above, mm.
+    """Return an upper bound on the radius of a contact, mm.
 
     It is sqrt(5/2) times the rms distance of the load from the apex. None of it stands beyond the sheet's other corner,
     nor beyond a cap's rim, which along the arc is at most pi/2 times as far as straight.
@@ -397,7 +384,7 @@ def _most_k(scene: Scene, sensor: SensorSpec) -> float:
 
 
 def _counts_per_k(kind: ChannelKind, scene: Scene, sensor: SensorSpec) -> float:
-    """Return at most how far a channel of `kind` moves per kelvin of the core."""
+    """Return an upper bound on the change of a reading of `kind` per kelvin of the core, in counts."""
     top = max(channel.upper or 1.0 for channel in sensor.channels(kind))
     if kind == "taxel":
         coefficient = sensor.parameters.get("conductivity_coefficient")

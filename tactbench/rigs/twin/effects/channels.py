@@ -1,4 +1,4 @@
-"""What stands between the skin's reading and the stored number: gains, levels, drift, noise, the converter."""
+"""Effects between the reading of the skin and the stored number: gain, levels, drift, noise, converter."""
 
 from __future__ import annotations
 
@@ -46,9 +46,11 @@ def gain(run: Synthesis) -> None:
 def rest_spread(run: Synthesis) -> None:
     """Move each taxel's rest level by the sensor parameter ``rest_spread`` (sd), the same in every recording."""
     stated = run.sensor.spec.parameters.get("rest_spread")
-    for track in run.tracks if stated is not None else ():
+    if stated is None:
+        return
+    for track in run.tracks:
         columns = track.by_kind().get("taxel")
-        if columns and stated is not None:
+        if columns:
             numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
             track.readings[:, columns] += stated.value * numbers
 

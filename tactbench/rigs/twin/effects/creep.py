@@ -1,11 +1,11 @@
-"""Creep: part of the response follows the load late."""
+"""Creep: part of a channel's response follows the load with a delay."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tactbench.plugin import ChannelKind, FloatArray
-from tactbench.plugin.simulation import Creep, Nuisances
+from tactbench.plugin.simulation import Nuisances
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, read_names, skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
@@ -14,28 +14,23 @@ from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
 def apply(run: Synthesis) -> None:
     """Replace the force that each kind of channel follows by ``F (1 - sum c_i) + sum c_i lag_i(F)``.
 
-    Linear viscoelasticity acts on the force before the load table is asked: loops follow from the force's history.
-    It is left out, and the plan says so, where it changes no reading by more than a third of noise and rounding
+    Linear viscoelasticity acts on the force before the load table is evaluated: hysteresis follows from its history.
+    It is left out, and the plan is updated, where it changes no reading by more than a third of noise and rounding
     (:func:`bounds`), unless the scene asks for it by name or has a motor's force loop.
     """
-    late = {kind: stated for track in run.tracks for kind in track.by_kind() if (stated := _creeping(run, kind))}
-    if late and run.scene.drive is None and "creep" not in run.asked and _settled(run, late):
+    stated = {kind: run.nuisances(kind) for track in run.tracks for kind in track.by_kind()}
+    late = {kind: one for kind, one in stated.items() if one is not None and one.creep}
+    if late and run.scene.drive is None and "creep" not in run.forced and _settled(run, late):
         return
     for track in run.tracks:
         for kind in track.by_kind():
             if kind in late:
-                effective = followed(track.t_s, track.force_n, late[kind].creep)
+                fractions = [term.fraction.to("1") for term in late[kind].creep]
+                effective: FloatArray = (1.0 - sum(fractions)) * track.force_n
+                for fraction, term in zip(fractions, late[kind].creep, strict=True):
+                    effective = effective + fraction * lag(track.t_s, track.force_n, term.tau.to("s"))
                 # A weighted mean of forces that were: rounding must not leave the table's range.
                 track.effective_n[kind] = np.clip(effective, track.force_n.min(), track.force_n.max())
-
-
-def followed(t_s: FloatArray, force_n: FloatArray, terms: tuple[Creep, ...]) -> FloatArray:
-    """Return the (n,) force that a response follows whose `terms` come late."""
-    fractions = [term.fraction.to("1") for term in terms]
-    effective: FloatArray = (1.0 - sum(fractions)) * force_n
-    for fraction, term in zip(fractions, terms, strict=True):
-        effective = effective + fraction * lag(t_s, force_n, term.tau.to("s"))
-    return effective
 
 
 def steepest_n_per_s(load: Load) -> float:
@@ -49,7 +44,7 @@ def steepest_n_per_s(load: Load) -> float:
 
 
 def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKind, tuple[float, float]]:
-    """Return what leaving creep out changes at most, and the slope behind it, by kind: counts, counts per newton.
+    """Return, by kind, a bound on the change by leaving creep out [count] and the slope it rests on [count/N].
 
     Behind a load that changes at most at a rate ``r`` a lag of time constant ``tau`` stays back by at most ``tau r``.
     So the force is off by at most ``r sum(c_i tau_i)``, and a reading by that times its largest slope: that of the
@@ -64,29 +59,16 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
             if kind not in late:
                 continue
             late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in late[kind].creep)
-            slope = (
-                _steepest(track, own, names, table.steepest(*_visited(track))) if kind in READ_FROM_THE_SKIN else np.inf
-            )
-            slope *= _stretch(run) if kind == "taxel" else 1.0
+            slope = np.inf
+            if kind in READ_FROM_THE_SKIN:
+                steepest = table.steepest(float(track.force_n.min()), float(track.force_n.max()))
+                slope = _steepest(track, own, names, steepest)
+            if kind == "taxel" and run.scene.environment.indenter_temperature is not None:
+                from tactbench.rigs.twin.effects.heat import largest_stretch
+
+                slope *= largest_stretch(run)
             found[kind] = max(found.get(kind, (0.0, 0.0)), (slope * late_s * rate, slope))
     return found
-
-
-def _stretch(run: Synthesis) -> float:
-    if run.scene.environment.indenter_temperature is None:
-        return 1.0
-    from tactbench.rigs.twin.effects.heat import largest_stretch
-
-    return largest_stretch(run)
-
-
-def _creeping(run: Synthesis, kind: ChannelKind) -> Nuisances | None:
-    stated = run.nuisances(kind)
-    return stated if stated is not None and stated.creep else None
-
-
-def _visited(track: Track) -> tuple[float, float]:
-    return float(track.force_n.min()), float(track.force_n.max())
 
 
 def _steepest(track: Track, own: list[int], names: list[str], slopes: FloatArray) -> float:
@@ -95,7 +77,7 @@ def _steepest(track: Track, own: list[int], names: list[str], slopes: FloatArray
 
 
 def _settled(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> bool:
-    """Return whether creep is left out; the plan gets the bound and where it comes from."""
+    """Decide whether creep is left out, enter the decision and its bound into the plan, and return it."""
     found = bounds(run, late)
     hidden = {kind: late[kind].hidden(run.scene.environment.noise_scale) for kind in found}
     most, slope = max(found.values())

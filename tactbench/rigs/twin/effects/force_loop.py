@@ -1,4 +1,4 @@
-"""A motor under force control: the true force is what the loop makes of the commanded one."""
+"""A motor under force control, whose loop turns the commanded force into the true one."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.synthesis import Load, Synthesis
 
 BEYOND = 3.0
-"""How far beyond the largest commanded force the skin is known to the loop; the motor goes no deeper than that."""
+"""Multiple of the largest commanded force up to which the skin is solved; it limits the motor's travel."""
 RETRACT_MM = 1.0
-"""How far the motor may withdraw from the skin; no source, it only bounds a loop that swings."""
+"""Travel limit away from the skin [assumed]; it bounds a loop that oscillates."""
 _CURVE_POINTS = 4001
 """Depths at which the force is tabulated. Straight between them: against the curve of the solved loads the force is
 off by less than 1e-4 of the largest (test)."""
 
 
 def apply(run: Synthesis) -> None:
-    """Step the scene's loop over the recording and let the load be what it exerts.
+    """Simulate the force loop over the recording and make its force the load.
 
     Without a rate of its own the loop reads the force once per recorded sample, and its sensor errs by the very
     numbers that are recorded: it is one sensor.
     """
     drive = run.scene.drive
-    if drive is None or not run.load.largest_n > 0 or run.sensor.spec.skin is None:
+    if drive is None or not run.load.largest_n > 0:
         return
     duration = run.scene.profile.duration.to("s")
     per_sample = drive.rate is None
@@ -41,7 +41,7 @@ def apply(run: Synthesis) -> None:
     noise = run.scene.environment.force_noise.to("N") * errors.standard_normal(steps)
     table = bare_skin(run, BEYOND * run.load.largest_n)
     force_n, deepest = force_at_depth(table)
-    start = depth_of(table, float(setpoint[0]))
+    start = float(table.skin(setpoint[:1]).depth_mm[0])
     model = LoopModel.of(drive, "mm", period_s=step_s, travel=(-RETRACT_MM, deepest))
     depths = model.simulate(force_n, setpoint, noise, start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
@@ -77,9 +77,3 @@ def force_at_depth(table: LoadTable) -> tuple[Callable[[float], float], float]:
         return forces[before] + (place - before) * (forces[before + 1] - forces[before])
 
     return force_n, deepest
-
-
-def depth_of(table: LoadTable, force_n: float) -> float:
-    """Return the depth at which the skin answers with a force, mm."""
-    depth: FloatArray = table.skin(np.array([force_n])).depth_mm
-    return float(depth[0])

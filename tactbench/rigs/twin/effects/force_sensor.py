@@ -1,4 +1,4 @@
-"""The reference force sensor: its own noise, and a low-pass on what is recorded."""
+"""Noise and low-pass filter of the reference force sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction: what the surface does to the skin along the way it slides."""
+"""Friction between a sliding surface and the skin."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffnes
 from tactbench.rigs.twin.synthesis import Synthesis
 
 GRID_HZ = 500.0
-"""Nodes at which load and stiffness are taken; both change over seconds."""
+"""Rate of the nodes between which load and stiffness are interpolated; both change over seconds."""
 MODE: dict[str, Quantity] = {
     "skin_mode_frequency": derived(
         330.0, "Hz", "Fishel and Loeb 2012: a BioTac feels the smallest vibrations near 330 Hz"
     ),
     "skin_mode_damping": assumed(0.1, "1", "share of the critical damping; no source for any of these skins"),
 }
-"""The skin's mode for sensors whose parameters do not state their own."""
+"""Default mode of the skin for sensors whose parameters state none."""
 
 
 def mode_of(sensor: SensorSpec) -> Mode:
-    """Return the mode in which the skin under a contact swings."""
+    """Return the tangential mode of the skin under a contact."""
     found = {**MODE, **sensor.parameters}
     return Mode(2.0 * math.pi * found["skin_mode_frequency"].to("Hz"), found["skin_mode_damping"].to("1"))
 
 
 def apply(run: Synthesis) -> None:
-    """Drag the skin, and let the force sensor see the tangential force and who keeps score of slip.
+    """Drag the skin, and record the tangential force and the true slip with the reference force.
 
     The force sensor's stream gains ``fx`` and ``fy`` (force on the sensor, along x and s), ``slip`` (how far the
     surface has slipped over the skin under it, in metres), ``slipping`` (1 while the whole contact slips) and
     ``stick_ratio``.
     """
-    slide, skin = run.scene.slide, run.sensor.spec.skin
-    if slide is None or skin is None or not run.load.largest_n > 0:
+    slide = run.scene.slide
+    if slide is None or not run.load.largest_n > 0:
         return
     surface, mode = slide.surface, mode_of(run.sensor.spec)
     duration = run.scene.profile.duration.to("s")
@@ -56,7 +56,7 @@ def apply(run: Synthesis) -> None:
         mode=mode,
         t_s=grid,
         load_n=load,
-        stiffness=sliding_stiffness(radius, shear_modulus_mpa(skin)),
+        stiffness=sliding_stiffness(radius, shear_modulus_mpa(run.skin)),
     )
     dragged = Dragged(drive)
     run.sliding = dragged

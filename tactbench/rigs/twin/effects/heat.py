@@ -1,4 +1,4 @@
-"""Heat through the contact: what it does to the core, to the channels of temperature and to resistive channels."""
+"""Effects of heat flow through the contact on the core, the temperature channels and the resistive channels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tactbench.rigs.twin.synthesis import Synthesis, Track
 
 
 def contact_heat(run: Synthesis) -> None:
-    """Let heat flow between the core and an indenter of known temperature, through the contact's own radius."""
+    """Compute how heat flow between core and indenter, through the area of contact, warms the core."""
     core = HeatedCore.of(run.scene, run.sensor.spec)
     indenter = run.scene.environment.indenter_temperature
     conductivity = run.sensor.spec.parameters.get("contact_conductivity")
@@ -29,18 +29,18 @@ def contact_heat(run: Synthesis) -> None:
 
 
 def dc_temperature(run: Synthesis) -> None:
-    """Let the channels of steady temperature say what the thermistor does, behind its low-pass."""
+    """Set the channels of steady temperature to the low-passed reading of the thermistor."""
     for track in run.tracks:
         for column in track.by_kind().get("dc_temperature", []):
             reading = _thermistor(run, track, column)
             rest = track.channels[column].rest
             if reading is not None:
-                # Tracks start at rest; the thermistor's own formula says where this core stands instead.
+                # Tracks start at rest; the thermistor's formula gives the level of this core instead.
                 track.readings[:, column] += reading - (0.0 if rest is None else rest.value)
 
 
 def ac_temperature(run: Synthesis) -> None:
-    """Let the channels of changing temperature add the thermistor's reading, high-passed and amplified."""
+    """Add the high-passed, amplified reading of the thermistor to the channels of changing temperature."""
     stated = run.sensor.spec.parameters
     if "thermal_high_pass" not in stated or "thermal_gain" not in stated:
         return
@@ -89,7 +89,7 @@ def thermal_drift(run: Synthesis) -> None:
 
 
 def largest_stretch(run: Synthesis) -> float:
-    """Return by what factor a difference between two readings may grow on its way through this drift, at least 1.
+    """Return an upper bound, at least 1, on the factor by which thermal drift stretches a difference of two readings.
 
     A divider's reading behind a resistance divided by g has the slope ``g / (1 + (g - 1) E/top)²`` against the reading
     E before, which is at most g or 1/g. The core is never warmer or colder than its untouched self and the indenter.

@@ -25,7 +25,7 @@ _ICE_K = 273.15
 
 @dataclass(frozen=True)
 class HeatedCore:
-    """What heats the core, and what it loses heat to."""
+    """A heated core as one thermal mass."""
 
     room_c: float
     power_w: float
@@ -46,7 +46,7 @@ class HeatedCore:
 
     @property
     def rise_k(self) -> float:
-        """How far a warm core stands above the room."""
+        """Temperature of the warm core above that of the room, K."""
         return self.power_w * self.resistance_k_per_w
 
     @property

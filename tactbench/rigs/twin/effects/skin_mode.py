@@ -1,4 +1,4 @@
-"""The skin's tangential mode: how it swings back in a slip, and how a motion shakes it.
+"""The tangential mode of the skin: its motion in a slip, and its response to a given motion.
 
 In a slip the skin under the contact is a damped oscillator ``x'' + 2 z w x' + w^2 (x - x_e) = 0`` about ``x_e``, the
 deflection that kinetic friction holds. It lets go at ``x_e + u`` with the surface's speed V and is caught when it has
@@ -20,7 +20,7 @@ from tactbench.rigs.twin.effects.memory import ComplexArray, recurrence
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of the skin."""
+    """A damped tangential oscillation of the skin under the contact."""
 
     omega: float
     """Undamped angular frequency, rad/s."""
@@ -36,7 +36,7 @@ class Mode:
 
     @property
     def decay(self) -> float:
-        """Rate at which it dies away, 1/s."""
+        """Decay rate of the oscillation, 1/s."""
         return self.damping * self.omega
 
     @property
@@ -57,16 +57,9 @@ def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> 
 
 
 def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
-    """Return the deflection of :func:`swing` for one moment, without arrays: it is asked for once a slip."""
+    """Return the deflection of :func:`swing` at one moment, without arrays: it is evaluated once per slip."""
     w, r = mode.swing, mode.decay
     return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
-
-
-def _turn(mode: Mode, u: float, speed: float) -> float:
-    """Return the phase at which the velocity is lowest, between 0 and pi; half a turn later it is highest."""
-    w, r = mode.swing, mode.decay
-    back = (mode.omega**2 * u + r * speed) / w
-    return math.atan2(r * speed + back * w, r * back - speed * w)
 
 
 def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
@@ -79,7 +72,7 @@ def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
 
 
 def slip_s(mode: Mode, u: float, speed: float) -> float:
-    """Return how long the slip lasts; infinity if the skin is never caught.
+    """Return the duration of the slip in seconds; infinity if the skin never sticks again.
 
     The velocity rises throughout the half turn after its minimum: one root there, found by Newton steps inside a
     shrinking bracket to the last digits.
@@ -88,7 +81,7 @@ def slip_s(mode: Mode, u: float, speed: float) -> float:
     back = (mode.omega**2 * u + r * speed) / w
     if not u > 0:
         return math.inf
-    low = _turn(mode, u, speed) / w
+    low = math.atan2(r * speed + back * w, r * back - speed * w) / w
     high = low + math.pi / w
 
     def excess(t: float) -> tuple[float, float]:

@@ -16,15 +16,15 @@ LIFT: Quantity = assumed(
 )
 """Normal over tangential motion of the skin, for sensors whose parameters state no ``skin_lift``."""
 COMPONENTS = 48
-"""Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""
+"""Number of cosines of the profile: enough to be close to Gaussian; it determines the effect's cost."""
 LONGEST_MM, SHORTEST_MM = 100.0, 0.02
-"""Of their wavelengths. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
+"""Wavelengths of the cosines. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band."""
 _RADII = 1025
 """Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
 
 def apply(run: Synthesis) -> None:
-    """Shake the skin on every clock that reads it: by the profile it slips over, and by stick-slip.
+    """Compute the vibration of the skin on every clock that reads it, caused by the rough profile and by stick-slip.
 
     The indenter is held where it stood when the slip began, so that the profile passing under the contact moves the
     skin, through its mode, and with it the normal force that is measured. The tangential motion of stick-slip (which
@@ -60,7 +60,7 @@ def apply(run: Synthesis) -> None:
 
 
 class Profile:
-    """A random self-affine profile: a function of the place, the same whenever it is asked.
+    """A random self-affine profile: a deterministic function of the place.
 
     Its spectrum over the wave number k is even up to the roll-off and falls as ``k^-(1 + 2 H)`` beyond (Persson et al.
     2005, J. Phys.: Condens. Matter 17 R1). Of each of equal steps in ln k one cosine, anywhere within it, has the

@@ -1,7 +1,7 @@
-"""The skin dragged along: sticking, slipping and steady sliding, event by event, each phase in closed form.
+"""Stick-slip of a dragged skin: sticking, slipping and steady sliding, each phase in closed form.
 
 The surface moves at a constant speed; load, contact radius and stiffness change slowly and are straight between the
-nodes of a grid. Nothing is stepped through: a phase ends where its closed form says so.
+nodes of a grid. There are no time steps: the end of a phase is computed in closed form.
 
 - **stick**: the skin moves with the surface, until elastic and viscous force reach ``mu_s N``. The force follows
   Cattaneo and Mindlin.
@@ -28,14 +28,14 @@ from tactbench.rigs.twin.synthesis import Tangential
 
 REST, STICK, SLIP, SLIDE, HELD = range(5)
 _LEAST_LOAD_N = 1e-4
-"""Below it a load has no contact worth a stick-slip cycle: it slides."""
+"""Smallest load with stick-slip; under less the skin slides."""
 _RUNG_OUT = math.log(1e3)
-"""A slip that is never caught is followed until its swing has fallen to a thousandth."""
+"""Decay after which the oscillation of a slip without end counts as over: a thousandth."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What moves over the skin, and what the skin is there."""
+    """The motion of a surface over the skin, and the properties of the contact."""
 
     speed_mm_s: float
     start_s: float
@@ -54,16 +54,16 @@ class Drive:
 
 @dataclass
 class _Phases:
-    """Beginnings of phases and what each needs; a phase lasts to the next one's beginning."""
+    """Phases of the motion, column by column; a phase lasts until the next one begins."""
 
     t_s: list[float] = field(default_factory=list)
     kind: list[int] = field(default_factory=list)
     x_mm: list[float] = field(default_factory=list)
-    """Deflection at its beginning."""
+    """Deflection of the skin at the beginning of the phase."""
     e_mm: list[float] = field(default_factory=list)
-    """Equilibrium of a slip; where the skin that is held after the motion last had tractions in proportion."""
+    """Equilibrium of a slip; of a held skin, the deflection at which tractions were last proportional to pressure."""
     friction: list[float] = field(default_factory=list)
-    """Coefficient of a slip."""
+    """Kinetic friction coefficient of a slip."""
 
     def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0, friction: float = 0.0) -> None:
         self.t_s.append(t_s)
@@ -74,13 +74,7 @@ class _Phases:
 
 
 class Dragged:
-    """The skin under a drive, at any moment.
-
-    Parameters
-    ----------
-    drive
-        The motion and the skin.
-    """
+    """The state of the skin that a `drive` drags, at any moment."""
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
@@ -89,7 +83,7 @@ class Dragged:
         # Viscous force at the drive's speed over the stiffness.
         lag_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
         self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
-        """(m,) deflection at which it lets go; over the held part there is no viscous force."""
+        """(m,) deflection at which a slip begins while the surface moves."""
         self._release_mm = drive.static * drive.load_n * per_n
         self._kinetic = self._within_slip(per_n)
         self._kinetic_mm = self._kinetic * drive.load_n * per_n
@@ -98,7 +92,7 @@ class Dragged:
         self._breaks = (
             contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
         )
-        """(m,) sliding is not stable there, and stick-slip lives."""
+        """(m,) whether sliding is unstable and stick-slip occurs."""
         self._way_mm = drive.speed_mm_s * drive.t_s
         self._x_t: list[FloatArray] = []
         self._x_mm: list[FloatArray] = []
@@ -114,16 +108,16 @@ class Dragged:
 
     @property
     def let_go_s(self) -> FloatArray:
-        """(k,) when the skin let go."""
+        """(k,) times at which the skin began to slip."""
         return np.asarray(self._begin[self._kind == SLIP])
 
     @property
     def caught_s(self) -> FloatArray:
-        """(k,) when the surface caught the skin again, or took hold of it for the first time."""
+        """(k,) times at which the skin began to stick."""
         return np.asarray(self._begin[self._kind == STICK])
 
     def _within_slip(self, per_n: FloatArray) -> FloatArray:
-        """Return (m,) the coefficient within a slip: at its mean speed as it would be without damping."""
+        """Return the (m,) friction coefficient within a slip: that at its mean speed without damping."""
         drive = self.drive
         if drive.stribeck_mm_s < COULOMB_MM_S:
             return np.full(drive.t_s.size, drive.kinetic)
@@ -172,7 +166,7 @@ class Dragged:
             self._hold(max(t, drive.start_s), x, since)
 
     def _lets_go(self, t: float, x: float, end: float) -> tuple[float, float]:
-        """Return when and where the skin that sticks at x since t lets go; at `end` if not before."""
+        """Return time and deflection at which the skin that sticks since t at x begins to slip, at most `end`."""
         drive = self.drive
         lead_mm = drive.speed_mm_s * t - x
         if x >= np.interp(t, drive.t_s, self._static_mm):
@@ -198,7 +192,7 @@ class Dragged:
         return cross, x + drive.speed_mm_s * (cross - t)
 
     def _slide(self, t: float, x: float, end: float) -> tuple[float, float]:
-        """Slide from t until it turns unstable, or to the end."""
+        """Append a phase of sliding from t until it becomes unstable or ends; return its end and the deflection."""
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
         last = int(np.searchsorted(drive.t_s, end, side="left"))
@@ -225,7 +219,7 @@ class Dragged:
         self._x_mm.append(np.minimum.accumulate(held))
 
     def __call__(self, t_s: FloatArray) -> Tangential:
-        """Return what happens at (n,) moments."""
+        """Return the tangential state at (n,) moments."""
         drive = self.drive
         phase = np.searchsorted(self._begin, t_s, side="right") - 1
         kind, begin, x0, about = self._kind[phase], self._begin[phase], self._from[phase], self._about[phase]

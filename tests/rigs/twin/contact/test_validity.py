@@ -10,16 +10,15 @@ import pytest
 from tactbench.plugin import RigError
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import Contact, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tests.hard.families.contact import press_of
 from tests.rigs.twin.conftest import SPECS
 
 
 def pressed(name, radius, x=0.0):
-    """Return a press, the radius of its finger, and its pad."""
+    """Return a press and the sheet of its skin."""
     skin = SPECS[name].skin
-    press = press_of(skin, Contact(radius, x, 0.0))
-    return press, skin.sheet.outer_radius.to("mm"), pad_of(skin.sheet, press.medium.grid)
+    return press_of(skin, Contact(radius, x, 0.0)), skin.sheet
 
 
 def _texts(found):
@@ -27,9 +26,9 @@ def _texts(found):
 
 
 def test_an_ordinary_contact_needs_no_remark():
-    made, outer, pad = pressed("icub", 10.0)
-    assert remarks(made, [0.0], outer, pad) == {}
-    found = remarks(made, [0.0, 0.01, 0.5, 5.0], outer, pad)
+    made, sheet = pressed("icub", 10.0)
+    assert remarks(made, [0.0], sheet) == {}
+    found = remarks(made, [0.0, 0.01, 0.5, 5.0], sheet)
     assert _texts(found) == set()
     assert found["contact_radius_cells"] == pytest.approx(math.sqrt(np.count_nonzero(made(5.0).pressure_mpa) / math.pi))
     assert found["resolved_above_n"] == 0.5
@@ -47,16 +46,15 @@ def test_an_ordinary_contact_needs_no_remark():
     ],
 )
 def test_what_a_reader_must_know(name, radius, force, x, expected):
-    made, outer, pad = pressed(name, radius, x)
-    sheet = SPECS[name].skin.sheet
-    assert expected <= _texts(remarks(made, [force], outer, pad, dome=sheet.dome, relief=sheet.relief))
+    made, sheet = pressed(name, radius, x)
+    assert expected <= _texts(remarks(made, [force], sheet))
 
 
 def test_a_cap_pressed_in_past_its_rim_is_refused():
-    made, outer, _ = pressed("biotac", 1.0, -5.0)
-    check_reach(made, 5.0, outer)
+    made, sheet = pressed("biotac", 1.0, -5.0)
+    check_reach(made, 5.0, sheet)
     with pytest.raises(RigError, match="past its rim") as refused:
-        check_reach(made, 500.0, outer)
+        check_reach(made, 500.0, sheet)
     assert refused.value.hint
 
 

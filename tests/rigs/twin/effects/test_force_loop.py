@@ -9,7 +9,7 @@ from tactbench.core.spec.drive import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.plugin.devices import LoopModel
 from tactbench.rigs.twin.contact.stages import bare_skin
-from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
+from tactbench.rigs.twin.effects.force_loop import BEYOND, force_at_depth
 from tactbench.rigs.twin.preparation import prepare
 from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
@@ -128,6 +128,6 @@ def test_depth_and_force_undo_each_other(pressed):
     force_n, deepest = force_at_depth(table)
     for wanted in np.linspace(0.0, 15.0, 97):
         # The straight lines between 4001 depths; 1.5 mN of 15 N.
-        assert force_n(depth_of(table, float(wanted))) == pytest.approx(wanted, abs=1.5e-3)
+        assert force_n(float(table.skin(np.array([wanted])).depth_mm[0])) == pytest.approx(wanted, abs=1.5e-3)
     assert force_n(-1.0) == force_n(0.0) == 0.0
     assert force_n(2 * deepest) == pytest.approx(15.0)
