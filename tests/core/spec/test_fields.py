@@ -13,7 +13,9 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from tactbench.core import spec
-from tactbench.core.spec.quantity import Quantity, Source
+from tactbench.core.spec.quantity import Frozen, Quantity, Source
+from tactbench.core.spec.row import FORMAT, NESTED
+from tactbench.core.spec.scene import NUISANCES
 
 FILE = Path(__file__).parent / "fields.txt"
 MODULES = [importlib.import_module(f"{spec.__name__}.{one.name}") for one in pkgutil.iter_modules(spec.__path__)]
@@ -29,8 +31,13 @@ def declared():
     found = []
     for module in MODULES:
         for name, value in vars(module).items():
-            if name.isupper() and not name.startswith("_") and value != () and numeric(value):
-                found.append(f"{name} = {value}")
+            if (
+                name.isupper()
+                and not name.startswith("_")
+                and value != ()
+                and (numeric(value) or isinstance(value, Frozen))
+            ):
+                found.append(f"{name} = {value!r}")
             if not (isinstance(value, type) and issubclass(value, BaseModel) and value.__module__ == module.__name__):
                 continue
             for field, info in value.model_fields.items():
@@ -40,6 +47,9 @@ def declared():
                 own = info.default != () and numeric(info.default)
                 if bounds or own:
                     found.append(" ".join([f"{name}.{field}", *bounds, *([f"= {info.default}"] if own else [])]))
+    found += [f"nuisance {name}: {'.'.join(way)} in {unit}" for name, (way, unit) in NUISANCES.items()]
+    for key, types in FORMAT.items():
+        found.append(f"row {key}: {', '.join(sorted(one.__name__ for one in types))}{', nested' * (key in NESTED)}")
     return "\n".join([*dict.fromkeys(found), ""])
 
 
