@@ -136,6 +136,14 @@ def test_what_bears_on_a_score_stands_beside_it(tmp_path, made, more, said):
     assert all(text.startswith(said) for text in found)
 
 
+@pytest.mark.parametrize(("lost", "named"), [(4, "0, 1, 2, 3"), (5, "0, 1, 2, 3, …")])
+def test_of_many_recordings_that_are_left_out_the_first_are_named(tmp_path, lost, named):
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n, n=20)) for n in range(lost, 7)]
+    paths += [record(tmp_path / f"{n}.h5", ramp(n, n=20)[0], np.full(20, np.nan)) for n in range(lost)]
+    (found,) = load_dataset(force_task(), sorted(paths)).findings
+    assert found.endswith(f"without any force sample: {named}")
+
+
 def test_a_fault_of_a_channel_that_the_task_does_not_look_at_is_no_finding(tmp_path):
     t = np.arange(0.0, 1000.0, 10.0)
     late = np.where(t > 960, t + 400, t)

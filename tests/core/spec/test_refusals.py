@@ -9,7 +9,7 @@ from tactbench.core.spec.events import THRESHOLDS, SlipTarget, SlipThresholds
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.rig_file import DeviceEntry, RigFile
+from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, RigFile
 from tactbench.core.spec.scene import Indenter, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import ChannelSpec, DataSheet, Nuisances, PhysicalRange, SensorSpec, StreamSpec
 from tactbench.core.spec.skin import SheetTable
@@ -88,6 +88,11 @@ TAKEN_AND_REFUSED = [
      [{}, {"sensors": ("a", "b"), "estimators": ("c", "d")}, {"sensors": ("a", "a")}, {"sensors": ("a",)}]),
     (DeviceEntry, {"link": "emulated"}, [{}, {"faults": ("late",)}, {"link": "can0"}],
      [{"link": "can0", "faults": ("late",)}, {"link": ""}]),
+    (ForceEntry, {"link": "can0", "device": "ati"}, [{}, {"sign": -1}], [{"sign": 0}, {"sign": 2}, {"range_n": 0.0}]),
+    (ChannelSpec, {"name": "a", "kind": "taxel"},
+     [{"sign": -1}, {"sign": 0}, {"sign": 1}], [{"sign": 2}, {"name": "1"}]),
+    (RigFile, {"rig": "bench", "sensors": {"icub": {"link": "a"}}},
+     [{}, {"version": 1}], [{"version": 2}, {"sensors": {}}]),
     (SheetTable, {"x_mm": (0, 1), "angle_deg": (0, 9, 18), "value_mm": ((1, 2, 3), (1, 2, 3)), "source": WHY}, [{}],
      [{"x_mm": (0, 1, 2)}, {"x_mm": (1, 1)}, {"angle_deg": (0, 9)}, {"angle_deg": (0, 9, 9)},
       {"x_mm": (), "value_mm": ()}, {"value_mm": ((1, 2, 3), (1, 2))}]),

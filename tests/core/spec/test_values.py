@@ -177,9 +177,9 @@ def test_what_the_converter_and_white_noise_hide():
 
 def test_a_table_over_the_sheet_is_straight_between_its_entries_and_even_beyond():
     source = Source(tag="assumed", reference="a test")
-    table = SheetTable(x_mm=(0, 2), angle_deg=(0, 90), value_mm=((1, 3), (5, 11)), source=source)
-    found = table.at(np.array([-1.0, 0.0, 1.0, 2.0, 3.0]), np.radians([-45.0, 0.0, 45.0, 120.0]))
-    np.testing.assert_allclose(found, [[2, 1, 2, 3], [2, 1, 2, 3], [5, 3, 5, 7], [8, 5, 8, 11], [8, 5, 8, 11]])
+    table = SheetTable(x_mm=(0, 2, 3), angle_deg=(0, 90), value_mm=((1, 3), (5, 11), (9, 9)), source=source)
+    found = table.at(np.array([-1.0, 0.0, 1.0, 2.0, 3.0, 4.0]), np.radians([-45.0, 0.0, 45.0, 120.0]))
+    np.testing.assert_allclose(found, [[2, 1, 2, 3], [2, 1, 2, 3], [5, 3, 5, 7], [8, 5, 8, 11], [9] * 4, [9] * 4])
     assert (table.least_mm, table.most_mm) == (1, 11)
     line = SheetTable(x_mm=(0,), angle_deg=(0, 90), value_mm=((1, 3),), source=source)
     np.testing.assert_allclose(line.at(np.array([4.0]), np.radians([45.0])), [[2.0]])
