@@ -33,10 +33,9 @@ def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_
     assert all(not np.array_equal(a, b) for a, b in zip(named.values(), without.values(), strict=True))
 
 
-@pytest.mark.parametrize(
-    ("door", "engine"), [("effect", "isolated"), ("indenter", "isolated"), ("indenter", "in-process")]
-)
-def test_what_another_task_of_the_run_names_changes_no_recording_of_a_scene_that_does_not(shell, without, door, engine):
-    beside = recordings(shell, "beside", "--task", f"patching-{door}", "--jobs", "1", "--engine", engine)
-    assert len(beside) == len(without) + 2
+@pytest.mark.parametrize(("doors", "engine"), [(("effect", "indenter"), "isolated"), (("indenter",), "in-process")])
+def test_what_other_tasks_of_the_run_name_changes_no_recording_of_a_scene_that_does_not(shell, without, doors, engine):
+    tasks = [word for door in doors for word in ("--task", f"patching-{door}")]
+    beside = recordings(shell, "beside", *tasks, "--jobs", "1", "--engine", engine)
+    assert len(beside) == len(without) + 2 * len(doors)
     assert all(np.array_equal(without[name], beside[name]) for name in without)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.statistics.paired import difference, holm, over_folds
+from tactbench.core.statistics.paired import corrected_t, difference, holm, over_folds
 
 from .made import mae_row, row
 
@@ -53,7 +53,13 @@ def test_verdicts_follow_the_interval_and_the_region(shift, same, verdict, beyon
 
 def test_without_replicates_nothing_is_decided():
     found = difference(mae_row("a", A, replicates={}), mae_row("b", A + 5))
-    assert (found.low, found.p, found.effect, found.verdict) == (None, None, None, "undecided")
+    assert (found.low, found.p, found.effect, found.verdict, found.paired) == (None, None, None, "undecided", False)
+
+
+def test_equal_answers_are_equivalent_only_where_a_region_is_stated():
+    for same, verdict in ((None, "undecided"), (0.1, "equivalent")):
+        found = difference(mae_row("a", B, equivalence=same), mae_row("b", B, equivalence=same))
+        assert (found.value, found.low, found.high, found.verdict) == (0.0, 0.0, 0.0, verdict)
 
 
 @settings(max_examples=40, deadline=None)
@@ -123,3 +129,12 @@ def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
     assert (found.mean, found.p) == pytest.approx((0.4, 2 * stats.t.sf(0.4 / deviation, 2)))
     assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 2) * deviation, rel=1e-9)
     assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
+    twice = one | {"metric": "true_mae"}
+    assert over_folds(twice, twice) is None, "scores of folds are against the reference"
+    assert over_folds(one, other | {"replicates": other["replicates"] | {"names": list("vwxyz")}}) is None
+
+
+@pytest.mark.parametrize(("differences", "p"), [([0.0, 0.0, 0.0], 1.0), ([0.5, 0.5, 0.5], 0.0)])
+def test_folds_that_differ_by_the_same_leave_no_doubt(differences, p):
+    found = corrected_t(differences, 0.25)
+    assert (found.mean, found.low, found.high, found.p) == (*[differences[0]] * 3, p)
