@@ -127,7 +127,8 @@ def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
     found = over_folds(one, other)
     deviation = np.sqrt((1 / 3 + 20 / 80) * np.var([0.6, 0.1, 0.5], ddof=1))  # three folds, 20 rows tested by 80
     assert (found.mean, found.p) == pytest.approx((0.4, 2 * stats.t.sf(0.4 / deviation, 2)))
-    assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 2) * deviation, rel=1e-9)
+    reach = stats.t.ppf(0.975, 2) * deviation
+    assert (found.low, found.high) == pytest.approx((found.mean - reach, found.mean + reach), rel=1e-9)
     assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
     twice = one | {"metric": "true_mae"}
     assert over_folds(twice, twice) is None, "scores of folds are against the reference"
