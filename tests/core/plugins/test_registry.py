@@ -7,9 +7,10 @@ from importlib import metadata
 
 import pytest
 
-from tactbench.core.errors import DuplicateNameError, PluginError
+from tactbench.core.errors import DuplicateNameError, PluginError, UsageError
 from tactbench.core.plugins import hookspecs
-from tactbench.core.plugins.registry import Registry, installed, load_object, load_registry
+from tactbench.core.plugins.registry import Owned, Registry, installed, load_object, load_registry
+from tactbench.plugin import RigDescriptor
 from tests.core.matrix.plugin_packages import write_metadata
 
 HEAD = """
@@ -158,6 +159,15 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     with pytest.raises(DuplicateNameError, match=r"'pad'.*copycat.*pad-maker") as error:
         registry.sensors["pad"]  # it is known, and refused when it is asked for
     assert [str(error.value)] == [str(refused) for refused in registry.refused]
+
+
+def test_where_no_rig_is_named_one_of_ours_is_meant():
+    registry = Registry()
+    for name, module in (("a", "other.rigs"), ("b", "tactbench.rigs.b"), ("c", "other.rigs")):
+        registry.rigs.add(Owned(RigDescriptor(name=name, title=name, where="x:y", simulated=True), module, "made", "1"))
+    assert registry.first_rig("simulated") == "b"
+    with pytest.raises(UsageError, match="No rig that replays"):
+        registry.first_rig("replays")
 
 
 def test_code_is_found_by_its_import_string(site):
