@@ -84,6 +84,12 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     assert any("band not observable above 1000 Hz" in one for one in result.remarks)
 
 
+def test_answers_of_training_and_validation_are_kept_of_a_single_fold_alone(paths):
+    assert set(run(paths).sets) == {"validation", "test"}
+    by_session = run(paths, "force-ratio", split="session")
+    assert (set(by_session.sets), by_session.score) == ({"test"}, 1.0)
+
+
 def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
     assert run(paths, "force-ratio").score == 1.0
     for name in ("slip-never", "slip-always"):
