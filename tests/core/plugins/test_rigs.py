@@ -4,7 +4,18 @@ import h5py
 import numpy as np
 import pytest
 
+from tactbench.core.errors import RigError, UsageError
+from tactbench.core.plugins.rigs import failing_as
 from tests.conftest import Verbs
+
+
+@pytest.mark.parametrize(
+    ("raised", "expected"),
+    [(ValueError("boom"), RigError), (SystemExit("boom"), RigError), (UsageError("boom", hint=""), UsageError)],
+)
+def test_what_code_of_a_rig_raises_is_an_error_of_the_rig_unless_it_is_one_of_ours(raised, expected):
+    with pytest.raises(expected, match="boom"), failing_as("It could not be built"):
+        raise raised
 
 
 def recordings(verbs, out, *more, plugins=("patching",)):
