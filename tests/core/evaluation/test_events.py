@@ -176,6 +176,14 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     assert names <= result.scores.keys()
 
 
+def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
+    states = slip_state.SPEC.model_copy(update={"scenes": (), "target": TASK.target})
+    found = [framed(load_dataset(task, paths[:1]), task, RULES, REGISTRY.estimators["slip-forest"]).tables[0].y
+             for task in (TASK, states)]  # fmt: skip
+    assert set(found[1]) == {0, 1, 2}
+    np.testing.assert_array_equal(found[0], found[1] == 2)
+
+
 def test_code_for_features_must_give_a_line_a_frame(paths):
     wrong = REGISTRY.estimators["wavelet-energy"].model_copy(update={"frames_by": f"{__name__}:one_line"})
     with pytest.raises(PluginContractError, match=r"shape \(1, 1\) for \d+ frames"):

@@ -84,7 +84,7 @@ def test_quantities_have_the_tag_of_their_maker_and_times_are_whole_nanoseconds(
     made = (sourced, measured, derived, assumed)
     assert [one(1.5, "mm", "why").source.tag for one in made] == [one.__name__ for one in made]
     assert sourced(1.5, "mm", "why") == sourced(1.5, "mm", "why").model_copy(update={"value": 1.5})
-    assert (nanoseconds(0.05), nanoseconds(1.4e-9)) == (50_000_000, 1)
+    assert (nanoseconds(5.0), nanoseconds(1.4e-9)) == (5_000_000_000, 1)
 
 
 def test_thresholds_are_scaled_where_labels_part_and_not_where_they_exist():
@@ -103,6 +103,7 @@ def test_named_profiles_without_parameters():
     assert (len(t), t[0], t[-1]) == (641, 4.0, pytest.approx(14.0))
     np.testing.assert_allclose(sine.forces_n[2:], 2 - np.cos(2 * np.pi * (t - 4)), atol=1e-9)
     assert force_profiles.staircase(steps=1, dwell=0, hold=0, rise=1e-3, rate=1).samples == 1
+    assert min(force_profiles.sine(mean=1, amplitude=1).forces_n[2:]) == 0
     assert force_profiles.staircase(steps=1, hold=0).times_s[:2] == (0, 0.5)
 
 
