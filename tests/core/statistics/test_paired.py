@@ -33,7 +33,7 @@ def test_other_replicates_are_not_paired():
     """Then the errors add up, and what sessions share does not cancel."""
     apart = difference(mae_row("a", A), mae_row("b", B, names=[f"t{place}" for place in range(7)]))
     together = difference(mae_row("a", A), mae_row("b", B))
-    assert (together.paired, apart.paired) == (True, False)
+    assert (together.paired, apart.paired, apart.smallest_p) == (True, False, 0.0)
     deviation = np.sqrt(A.var(ddof=1) / 7 + B.var(ddof=1) / 7)
     assert apart.high - apart.value == pytest.approx(stats.t.ppf(0.975, 6) * deviation, rel=1e-9)
 
@@ -116,6 +116,7 @@ def test_holms_own_steps():
     """Four at once: 0.01 x 4, 0.02 x 3, 0.03 x 2 raised to the one before, 0.2 x 1."""
     assert holm([0.03, 0.01, None, 0.2, 0.02]) == pytest.approx([0.06, 0.04, None, 0.2, 0.06])
     assert holm([]) == []
+    assert holm([0.8, 0.9]) == [1.0, 1.0]
 
 
 def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
