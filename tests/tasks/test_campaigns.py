@@ -111,12 +111,6 @@ def test_the_order_of_the_caps_belongs_to_the_seed():
     # Sessions are drawn each by itself.
     caps = [[name.rsplit("-", 1)[0] for name in order] for order in orders]
     assert sum(order[:5] == order[5:10] for order in caps) < 5
-    # A session's caps stay in it, the sessions in their order, and nothing but the order is changed.
-    declared, drawn = TASKS["curvature"].scenes, in_drawn_order(TASKS["curvature"].scenes, 3)
-    assert [item.role for item in drawn] == [item.role for item in declared]
-    assert [item.scene.starts_after_s for item in drawn] == [item.scene.starts_after_s for item in declared]
-    without = {item.scene.name: item.scene.model_copy(update={"starts_after_s": 0.0}) for item in declared}
-    assert {item.scene.name: item.scene.model_copy(update={"starts_after_s": 0.0}) for item in drawn} == without
 
 
 def test_what_is_to_be_recorded_holds_the_drawn_order(tmp_path):
@@ -125,10 +119,3 @@ def test_what_is_to_be_recorded_holds_the_drawn_order(tmp_path):
     cells = plan_cells(MatrixSpec(seed=5, repeats=1, tasks=(choice,)), ["icub"], REGISTRY)
     (orders,) = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path)).values()
     assert [order.scene.name for order in orders] == in_time("curvature", 5)
-
-
-def test_what_is_not_to_be_drawn_stays_where_it_is():
-    force = TASKS["force"].scenes
-    assert in_drawn_order(force, 9) == force
-    flats = [item for item in in_drawn_order(TASKS["inverse-radius"].scenes, 9) if not item.drawn_order]
-    assert flats == [item for item in TASKS["inverse-radius"].scenes if not item.drawn_order]

@@ -9,14 +9,14 @@ import pytest
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.samples import Quality
-from tactbench.plugin import Block, ChannelSpec, StreamSpec
+from tactbench.plugin import Block, ChannelSpec, StreamSpec, Summary
 
 from .made import evaluated, force_task, label_task, ramp, record, sensor_of, sessions, write
 
 MS = 1_000_000
 
 
-def two_streams(path, taxels, vibration, force, unit="N"):
+def two_streams(path, taxels, vibration, force, unit="N", **more):
     """A sensor with taxels at 100 Hz and vibration at its own times; the force on its own clock, not always there."""
     sensor = sensor_of(
         StreamSpec(name="slow", channels=(ChannelSpec(name="t0", kind="taxel"),)),
@@ -27,7 +27,7 @@ def two_streams(path, taxels, vibration, force, unit="N"):
         Block(name, (t_ms * MS).astype(np.int64), values[:, None])
         for name, (t_ms, values) in (("slow", taxels), ("fast", vibration), ("ft", force))
     ]
-    return write(path, sensor, *blocks, reference=(reference,))
+    return write(path, sensor, *blocks, reference=(reference,), **more)
 
 
 def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
@@ -68,6 +68,19 @@ def test_an_answer_from_the_time_alone_needs_a_clock(tmp_path):
     assert evaluated(force_task(), untimed, split="session").score > 0
     with pytest.raises(NotApplicable, match="time-index looks at the time alone, which not all"):
         evaluated(force_task(), untimed, "time-index", split="session")
+
+
+def test_samples_that_a_faster_stream_lacks_are_left_out_of_it_and_counted(tmp_path):
+    slow, fast = np.arange(0.0, 100.0, 10.0), np.arange(0.0, 100.0, 0.5)
+    values = np.where(np.arange(200) % 50 == 7, np.nan, fast)
+    whole = label_task(
+        features=("taxel", "ac_pressure"), answer_per="recording", splits=("shuffled",),
+        summaries=(Summary(measure="mean"),),
+    )  # fmt: skip
+    path = two_streams(tmp_path / "a.h5", (slow, slow), (fast, values), (slow, slow), labels={"kind": "a"})
+    data = load_dataset(whole, [path])
+    assert data.counts["rows of fast left out because a channel has no sample"] == 4
+    assert [len(one.data) for one in data.tables[0].readings] == [10, 196]
 
 
 def test_flagged_samples_are_kept_and_counted(tmp_path):
@@ -134,6 +147,14 @@ def test_what_bears_on_a_score_stands_beside_it(tmp_path, made, more, said):
     found = evaluated(force_task(), paths, split="session").findings
     assert len(found) == (said is not None)
     assert all(text.startswith(said) for text in found)
+
+
+@pytest.mark.parametrize(("lost", "named"), [(4, "0, 1, 2, 3"), (5, "0, 1, 2, 3, …")])
+def test_of_many_recordings_that_are_left_out_the_first_are_named(tmp_path, lost, named):
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n, n=20)) for n in range(lost, 7)]
+    paths += [record(tmp_path / f"{n}.h5", ramp(n, n=20)[0], np.full(20, np.nan)) for n in range(lost)]
+    (found,) = load_dataset(force_task(), sorted(paths)).findings
+    assert found.endswith(f"without any force sample: {named}")
 
 
 def test_a_fault_of_a_channel_that_the_task_does_not_look_at_is_no_finding(tmp_path):

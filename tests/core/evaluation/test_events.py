@@ -84,6 +84,12 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     assert any("band not observable above 1000 Hz" in one for one in result.remarks)
 
 
+def test_answers_of_training_and_validation_are_kept_of_a_single_fold_alone(paths):
+    assert set(run(paths).sets) == {"validation", "test"}
+    by_session = run(paths, "force-ratio", split="session")
+    assert (set(by_session.sets), by_session.score) == ({"test"}, 1.0)
+
+
 def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
     assert run(paths, "force-ratio").score == 1.0
     for name in ("slip-never", "slip-always"):
@@ -168,6 +174,14 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     assert result.score > 0.4  # a third is chance
     names = {"balanced accuracy with label thresholds halved", "macro F1 with label thresholds doubled"}
     assert names <= result.scores.keys()
+
+
+def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
+    states = slip_state.SPEC.model_copy(update={"scenes": (), "target": TASK.target})
+    found = [framed(load_dataset(task, paths[:1]), task, RULES, REGISTRY.estimators["slip-forest"]).tables[0].y
+             for task in (TASK, states)]  # fmt: skip
+    assert set(found[1]) == {0, 1, 2}
+    np.testing.assert_array_equal(found[0], found[1] == 2)
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):

@@ -113,6 +113,16 @@ def test_a_channel_that_is_a_monotone_function_of_the_target(tmp_path, name):
     assert bool(found) == (name in GIVEN_AWAY)
 
 
+def test_a_square_gives_the_size_of_a_signed_target_away(tmp_path):
+    def made(n):
+        X, force = ramp(n, n=200, label_noise=0.1)
+        signed = (force - 2.5) / 10  # within -1 to 1
+        X[:, 1] = signed**2
+        return X, signed
+
+    assert any("t1 is" in stamp for stamp in stamps(tmp_path, made))
+
+
 def test_few_rows_and_rows_of_other_recordings_are_no_evidence_of_a_copy():
     force = np.random.default_rng(1).uniform(0, 5, 300)
     assert is_copy(force**3, force)

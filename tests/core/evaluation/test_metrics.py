@@ -54,6 +54,15 @@ def test_an_error_that_few_units_do_not_bound_is_open_above():
     assert interval(0 * error, error, np.repeat(np.arange(5), 20)).high is None
 
 
+def test_a_share_near_the_middle_has_the_interval_of_the_jackknife_however_few_units_are_right():
+    """Two of ten units are right, and none of the others: a share of 0.2 is no share near 0."""
+    code, y = np.repeat(np.arange(10), 20), np.tile([0, 1], 100)
+    found = interval(y, np.where(code < 2, y, 1 - y), code, "accuracy", 2)
+    assert "Clopper" not in found.method
+    found = interval(y, np.where(code < 2, 1 - y, y), code, "accuracy", 2)
+    assert "Clopper" not in found.method
+
+
 @given(st.lists(st.lists(st.floats(-100, 100), min_size=2, max_size=20), min_size=1, max_size=3))
 def test_leaving_one_out_of_a_sum_of_means_gives_its_standard_error(strata):
     """The variances of the means of strata add, and what they differ by is no spread."""

@@ -78,7 +78,8 @@ def test_the_causal_mean_is_that_of_a_naive_loop(k, lengths, offset, seed):
 def test_a_shuffled_split_is_stamped_and_taken_unasked_only_where_nothing_else_fits(tmp_path):
     paths = sessions(tmp_path)
     shuffled_first = force_task(splits=("shuffled", "session"))
-    assert evaluated(shuffled_first, paths).split == "session"
+    by_session = evaluated(shuffled_first, paths)
+    assert (by_session.split, set(by_session.sets)) == ("session", {"test"})
     assert evaluated(shuffled_first, paths[:1]).split == "shuffled"
     shuffled = run(paths, "shuffled")
     assert shuffled.stamps

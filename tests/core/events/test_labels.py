@@ -113,3 +113,9 @@ def test_a_slip_as_short_as_a_sample_is_a_slip(samples):
 def test_a_surface_that_never_rests_is_refused():
     with pytest.raises(DataError, match="never rests"):
         labelled(keep=slice(1101, 1400))
+
+
+@pytest.mark.parametrize(("step_ns", "says"), [(0, "do not rise"), (1, "never rests")])
+def test_times_rise_strictly(step_ns, says):
+    with pytest.raises(DataError, match=says):
+        slip_labels(np.arange(4) * step_ns, np.zeros(4), np.zeros(4), np.zeros(4), MU, THRESHOLDS)

@@ -67,3 +67,5 @@ def test_displacement_at_detection_is_what_the_surface_moved_since_the_onset():
     late = np.array([0.5, -0.5, 1.5, 1.0, np.nan])
     moved = displacement_at_detection(onset, late, clock, displacement)
     assert moved == pytest.approx([0.005, 0.0, 0.020, np.nan, np.nan], nan_ok=True)
+    later = displacement_at_detection(onset + 7 * 10**9, late, clock + 7 * 10**9, displacement)
+    np.testing.assert_array_equal(later, moved)

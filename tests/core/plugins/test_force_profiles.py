@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import PluginContractError, UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.quantity import assumed
+from tactbench.plugin import ForcePath, ProfileDescriptor, Source
 
 
 def path_of(name, **given):
@@ -34,3 +35,18 @@ def test_a_staircase_goes_up_and_down_in_equal_steps():
 def test_a_parameter_that_cannot_be_is_named(name, given, says):
     with pytest.raises(UsageError, match=f"'{name}': {says}"):
         path_of(name, **given)
+
+
+def nothing():
+    return None
+
+
+def falling():
+    return ForcePath(times_s=(0, 0), forces_n=(0, 0), samples=1, source=Source(tag="assumed", reference="a test"))
+
+
+@pytest.mark.parametrize("name", ["nothing", "falling"])
+def test_a_plugin_that_makes_no_force_path_is_named(name):
+    profile = ProfileDescriptor(name="made", title="made", where=f"{__name__}:{name}")
+    with pytest.raises(PluginContractError, match="'made'"):
+        force_path(profile, {}, "a test")

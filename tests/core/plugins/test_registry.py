@@ -7,9 +7,10 @@ from importlib import metadata
 
 import pytest
 
-from tactbench.core.errors import DuplicateNameError, PluginError
+from tactbench.core.errors import DuplicateNameError, PluginError, UsageError
 from tactbench.core.plugins import hookspecs
-from tactbench.core.plugins.registry import Registry, installed, load_object, load_registry
+from tactbench.core.plugins.registry import Owned, Registry, installed, load_object, load_registry
+from tactbench.plugin import RigDescriptor
 from tests.core.matrix.plugin_packages import write_metadata
 
 HEAD = """
@@ -119,7 +120,7 @@ BAD = {
     "no-hook": (HEAD, "implements none"),
     "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "no hook.*tactbench_devices"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),
-    "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), "ZeroDivisionError"),
+    "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), r"ZeroDivisionError.*\(hook_raises.py, line \d"),
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
     # Nothing of a plugin is used unless all of it is right.
     "another-kind": (f"{EVERYTHING}@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()", "not EffectD"),
@@ -159,6 +160,15 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     with pytest.raises(DuplicateNameError, match=r"'pad'.*copycat.*pad-maker") as error:
         registry.sensors["pad"]  # it is known, and refused when it is asked for
     assert [str(error.value)] == [str(refused) for refused in registry.refused]
+
+
+def test_where_no_rig_is_named_one_of_ours_is_meant():
+    registry = Registry()
+    for name, module in (("a", "other.rigs"), ("b", "tactbench.rigs.b"), ("c", "other.rigs")):
+        registry.rigs.add(Owned(RigDescriptor(name=name, title=name, where="x:y", simulated=True), module, "made", "1"))
+    assert registry.first_rig("simulated") == "b"
+    with pytest.raises(UsageError, match="No rig that replays"):
+        registry.first_rig("replays")
 
 
 def test_code_is_found_by_its_import_string(site):

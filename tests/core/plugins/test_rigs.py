@@ -4,7 +4,18 @@ import h5py
 import numpy as np
 import pytest
 
+from tactbench.core.errors import RigError, UsageError
+from tactbench.core.plugins.rigs import failing_as
 from tests.conftest import Verbs
+
+
+@pytest.mark.parametrize(
+    ("raised", "expected"),
+    [(ValueError("boom"), RigError), (SystemExit("boom"), RigError), (UsageError("boom", hint=""), UsageError)],
+)
+def test_what_code_of_a_rig_raises_is_an_error_of_the_rig_unless_it_is_one_of_ours(raised, expected):
+    with pytest.raises(expected, match="boom"), failing_as("It could not be built"):
+        raise raised
 
 
 def recordings(verbs, out, *more, plugins=("patching",)):
@@ -33,10 +44,9 @@ def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_
     assert all(not np.array_equal(a, b) for a, b in zip(named.values(), without.values(), strict=True))
 
 
-@pytest.mark.parametrize(
-    ("door", "engine"), [("effect", "isolated"), ("indenter", "isolated"), ("indenter", "in-process")]
-)
-def test_what_another_task_of_the_run_names_changes_no_recording_of_a_scene_that_does_not(shell, without, door, engine):
-    beside = recordings(shell, "beside", "--task", f"patching-{door}", "--jobs", "1", "--engine", engine)
-    assert len(beside) == len(without) + 2
+@pytest.mark.parametrize(("doors", "engine"), [(("effect", "indenter"), "isolated"), (("indenter",), "in-process")])
+def test_what_other_tasks_of_the_run_name_changes_no_recording_of_a_scene_that_does_not(shell, without, doors, engine):
+    tasks = [word for door in doors for word in ("--task", f"patching-{door}")]
+    beside = recordings(shell, "beside", *tasks, "--jobs", "1", "--engine", engine)
+    assert len(beside) == len(without) + 2 * len(doors)
     assert all(np.array_equal(without[name], beside[name]) for name in without)

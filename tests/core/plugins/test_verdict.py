@@ -1,11 +1,13 @@
 """A verdict: one number held against the one that is known."""
 
+import dataclasses
 import json
 import math
 
 import numpy as np
 import pytest
 
+from tactbench.core.plugins import interfaces
 from tactbench.core.plugins.interfaces import Verdict
 
 
@@ -17,3 +19,9 @@ from tactbench.core.plugins.interfaces import Verdict
 def test_it_is_met_by_a_number_within_the_bound_which_is_included(found, expected, bound, met):
     assert Verdict("depth", found, expected, bound).met is met
     json.dumps(Verdict("depth", np.asarray(found), expected, bound).found)  # a plain number
+
+
+def test_what_plugins_and_rigs_exchange_cannot_be_changed():
+    found = [one for one in vars(interfaces).values() if dataclasses.is_dataclass(one)]
+    assert len(found) > 5
+    assert [one.__name__ for one in found if not one.__dataclass_params__.frozen] == []

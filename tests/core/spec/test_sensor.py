@@ -1,8 +1,5 @@
 """Several channels at one place are one taxel, and figures of real units are no part of what is recorded."""
 
-import pytest
-from pydantic import ValidationError
-
 from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec.scene import RANGES, Scene
 from tactbench.plugin import (
@@ -29,13 +26,6 @@ def test_axes_of_a_magnet_are_one_site():
     pad = magnets(*axes("a"), lone, *axes("b"), warm)
     sites = [[one.name for one in site] for site in pad.sites("taxel")]
     assert sites == [["ax", "ay", "az"], ["lone"], ["bx", "by", "bz"]]
-
-
-@pytest.mark.parametrize("field", ["position_m", "normal"])
-def test_a_site_in_two_places_is_refused(field):
-    elsewhere = ChannelSpec(name="at", kind="taxel", site="a", **{field: (0.0, 0.0, 1.0)})
-    with pytest.raises(ValidationError, match="site a: the place of at is not that of ax"):
-        magnets(*axes("a"), elsewhere)
 
 
 def test_ranges_are_of_known_nuisances_and_hold_what_is_stated():

@@ -2,7 +2,7 @@ import pytest
 
 from tactbench.core.errors import ConfigError
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.yaml_file import load_yaml, plain_value
+from tactbench.core.spec.yaml_file import MOST_BYTES, load_yaml, plain_value
 
 GOOD = "version: 1\nsensors: [biotac]\ntasks:\n  - force\n  - name: curvature\n    estimators: [forest]\n"
 
@@ -18,7 +18,10 @@ def load(tmp_path, text):
     [
         (GOOD.replace("sensors", "sensor"), 2, "Did you mean 'sensors'"),
         (GOOD.replace("    estimators", "    estimatrs"), 6, "Did you mean 'estimators'"),
-        (GOOD + "repeats: many\n", 7, "repeats"),
+        (GOOD + "repeats: many\n", 7, "(given: 'many')"),
+        (GOOD + "latency: 3\n", 7, "(given: 3)"),
+        (GOOD + "seed: [1, 2]\n", 7, "integer."),
+        (GOOD.replace("[forest]", "[{name: 3}]"), 6, "(given: 3)"),
         (GOOD + "seed: 1\nseed: 2\n", 8, "stands here twice"),
         ("tasks: [\n", 2, ""),
         ("version: 1\n", 1, "'tasks' is missing"),
@@ -47,11 +50,20 @@ def test_a_number_in_an_odd_notation_is_refused(tmp_path, value):
     assert plain_value(value) == value
 
 
-def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
+def test_a_file_that_cannot_be_read_is_a_config_error(tmp_path):
     with pytest.raises(ConfigError, match="cannot be read"):
         load_yaml(tmp_path / "none.yaml", MatrixSpec)
-    with pytest.raises(ConfigError, match="is empty"):
-        load(tmp_path, "")
+    for text, says in (
+        ("", "is empty"),
+        ("#" * (MOST_BYTES + 1), "is larger than 128 KiB"),
+        ("day: 2024-99-99\n", "cannot be read as plain"),
+    ):
+        with pytest.raises(ConfigError, match=says):
+            load(tmp_path, text)
+    assert load(tmp_path, GOOD + "#" * (MOST_BYTES - len(GOOD))).sensors == ("biotac",)
+    (tmp_path / "matrix.yaml").write_bytes(b"tasks: [caf\xe9]")
+    with pytest.raises(ConfigError, match="is not UTF-8"):
+        load_yaml(tmp_path / "matrix.yaml", MatrixSpec)
 
 
 @pytest.mark.parametrize(("text", "value"), [("3", 3), ("0.5", 0.5), ("yes", True), ("a b", "a b"), ("[1]", "[1]")])

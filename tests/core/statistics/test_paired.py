@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.statistics.paired import difference, holm, over_folds
+from tactbench.core.statistics.paired import corrected_t, difference, holm, over_folds
 
 from .made import mae_row, row
 
@@ -33,7 +33,7 @@ def test_other_replicates_are_not_paired():
     """Then the errors add up, and what sessions share does not cancel."""
     apart = difference(mae_row("a", A), mae_row("b", B, names=[f"t{place}" for place in range(7)]))
     together = difference(mae_row("a", A), mae_row("b", B))
-    assert (together.paired, apart.paired) == (True, False)
+    assert (together.paired, apart.paired, apart.smallest_p) == (True, False, 0.0)
     deviation = np.sqrt(A.var(ddof=1) / 7 + B.var(ddof=1) / 7)
     assert apart.high - apart.value == pytest.approx(stats.t.ppf(0.975, 6) * deviation, rel=1e-9)
 
@@ -53,7 +53,13 @@ def test_verdicts_follow_the_interval_and_the_region(shift, same, verdict, beyon
 
 def test_without_replicates_nothing_is_decided():
     found = difference(mae_row("a", A, replicates={}), mae_row("b", A + 5))
-    assert (found.low, found.p, found.effect, found.verdict) == (None, None, None, "undecided")
+    assert (found.low, found.p, found.effect, found.verdict, found.paired) == (None, None, None, "undecided", False)
+
+
+def test_equal_answers_are_equivalent_only_where_a_region_is_stated():
+    for same, verdict in ((None, "undecided"), (0.1, "equivalent")):
+        found = difference(mae_row("a", B, equivalence=same), mae_row("b", B, equivalence=same))
+        assert (found.value, found.low, found.high, found.verdict) == (0.0, 0.0, 0.0, verdict)
 
 
 @settings(max_examples=40, deadline=None)
@@ -110,6 +116,7 @@ def test_holms_own_steps():
     """Four at once: 0.01 x 4, 0.02 x 3, 0.03 x 2 raised to the one before, 0.2 x 1."""
     assert holm([0.03, 0.01, None, 0.2, 0.02]) == pytest.approx([0.06, 0.04, None, 0.2, 0.06])
     assert holm([]) == []
+    assert holm([0.8, 0.9]) == [1.0, 1.0]
 
 
 def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
@@ -121,5 +128,15 @@ def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
     found = over_folds(one, other)
     deviation = np.sqrt((1 / 3 + 20 / 80) * np.var([0.6, 0.1, 0.5], ddof=1))  # three folds, 20 rows tested by 80
     assert (found.mean, found.p) == pytest.approx((0.4, 2 * stats.t.sf(0.4 / deviation, 2)))
-    assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 2) * deviation, rel=1e-9)
+    reach = stats.t.ppf(0.975, 2) * deviation
+    assert (found.low, found.high) == pytest.approx((found.mean - reach, found.mean + reach), rel=1e-9)
     assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
+    twice = one | {"metric": "true_mae"}
+    assert over_folds(twice, twice) is None, "scores of folds are against the reference"
+    assert over_folds(one, other | {"replicates": other["replicates"] | {"names": list("vwxyz")}}) is None
+
+
+@pytest.mark.parametrize(("differences", "p"), [([0.0, 0.0, 0.0], 1.0), ([0.5, 0.5, 0.5], 0.0)])
+def test_folds_that_differ_by_the_same_leave_no_doubt(differences, p):
+    found = corrected_t(differences, 0.25)
+    assert (found.mean, found.low, found.high, found.p) == (*[differences[0]] * 3, p)

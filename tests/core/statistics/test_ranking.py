@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.ranking import ranks
 
 from .made import mae_row, row
@@ -97,6 +98,12 @@ def test_practically_the_same_is_said_of_the_error_and_not_of_its_square(same, e
     holds = np.full(8, 0.5)
     errors = {name: own**2 + holds + 1e-5 * rng.standard_normal(8) for name, own in (("a", 0.2), ("b", 0.25))}
     assert places([force_row(name, one, holds, equivalence=same) for name, one in errors.items()]) == expected
+
+
+def test_a_place_is_sure_where_it_is_one_and_not_shared():
+    found = [Rank(place=1, low=low, high=high, tied=tied).unsure
+             for low, high, tied in ((1, 1, False), (1, 2, False), (1, 1, True), (None, None, False))]  # fmt: skip
+    assert found == [False, True, True, False]
 
 
 @pytest.mark.parametrize("seed", range(20))

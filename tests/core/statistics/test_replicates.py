@@ -13,9 +13,12 @@ from tactbench.core.statistics.replicates import (
     FEWEST,
     MedianInterval,
     against_reference,
+    count_range,
+    counted,
     least_coverage,
     median_interval,
     over_replicates,
+    percent,
 )
 from tests.core.leaderboard.rows import row
 
@@ -40,6 +43,7 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
     assert (found["n_replicates"], found["replicate_unit"], found["seeds"]) == (8, "replicate", list(range(1, 9)))
     assert found["replicate_scores"] == SCORES
     assert (found["score_min"], found["score_max"], found["fit_s"]) == (0.2, 0.9, 4.5)
+    assert found["ci_method"] == "order statistics of 8 replicates"
 
 
 def test_times_are_those_of_the_host_that_timed_the_first_and_no_others():
@@ -48,6 +52,46 @@ def test_times_are_those_of_the_host_that_timed_the_first_and_no_others():
     rows[1] |= {"fit_s": None, "host": "c"}
     (found,) = over_replicates(rows)
     assert (found["host"], found["fit_s"], found["seeds"]) == ("a", 3.0, list(range(2, 9)))
+
+
+def test_figures_of_replicates_are_their_medians_counts_their_sums_and_means_are_of_all():
+    def of(n):
+        return {
+            "events": {"alarms": n, "misses": 10 * n}, "operating_points": [{"recall": n / 4}, {"recall": n / 8}],
+            "confusion": [[n, 0], [1, n]], "counts": {"rows left out": n}, "chosen": {"k": n},
+            "scores": {"r2": n / 10}, "recordings_right": n, "delay_parts_ms": {"window": n, "link": 1.0},
+            "answer_delay_ms": n + 1.0,
+        }  # fmt: skip
+
+    rows = [one | of(n) for n, one in zip((1, 2, 6), replicates(SCORES[:3]), strict=True)]
+    (found,) = over_replicates(rows)
+    expected = of(2) | {
+        "events": {"alarms": 3.0, "misses": 20}, "confusion": [[9, 0], [3, 9]], "counts": {"rows left out": 9},
+        "recordings_right": 3.0,
+    }  # fmt: skip
+    assert {name: found[name] for name in expected} == expected
+    assert (found["ci_method"], found["replicates"]) == ("", {})
+    rows[0] |= {"operating_points": [], "events": {}, "confusion": None, "recordings_right": None}
+    (found,) = over_replicates(rows)
+    assert (found["operating_points"], found["recordings_right"], found["confusion"]) == ([], None, None)
+    assert found["events"] == {"alarms": 4.0, "misses": 40}
+
+
+def test_one_simulated_row_whose_split_holds_out_enough_keeps_its_own_interval():
+    kept = {"unit": "placement", "names": list("abcdef"), "strata": None, "sums": [], "own": [0.5] * 6}
+    (found,) = over_replicates([row(replicates=kept)])
+    assert (found["replicate_unit"], found["ci_low"], found["ci_high"]) == ("placement", *[
+        pytest.approx(row()[end]) for end in ("ci_low", "ci_high")
+    ])  # fmt: skip
+    assert over_replicates([row()])[0]["ci_low"] is None
+
+
+def test_how_many_replicates_is_written():
+    assert [counted(1, "session"), counted(2, "session"), counted(3, "press")] == [
+        "1 session", "2 sessions", "3 presses",
+    ]  # fmt: skip
+    assert [count_range(n, "session") for n in ([5, 5], [8, 5])] == ["5 sessions", "5 to 8 sessions"]
+    assert [percent(*one) for one in ((5, "replicate"), (5, "session"), (8, "replicate"))] == ["93.8 %", "95 %", "95 %"]
 
 
 def test_fewer_than_five_have_no_interval_and_share_a_rank():
@@ -99,6 +143,7 @@ def test_errors_of_force_are_compared_beyond_their_floor():
     found = difference(one, other)
     assert "beyond the floor" in found.method
     own, others = (each["replicates"]["beyond"] for each in (one, other))
+    assert one["replicates"]["excess"] == pytest.approx(np.square(own))
     assert found.value == pytest.approx(np.mean(own) - np.mean(others))
 
 
