@@ -46,8 +46,7 @@ HEAVY = frozenset({
 """Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
 
 
-IMPORT_S, THREAD_S = 1.0, 1.0
-"""How long the import of a plugin may take [s of a processor], and how long a thread may take to end."""
+IMPORT_S, THREAD_S = 1.0, 1.0  # a plugin's import may take so long [s of a processor], and a thread to end
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -112,8 +111,9 @@ class Subject:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
             return next(one for one in offered if one.name == self.name)
         except (PluginError, KeyError, StopIteration) as error:
-            text = f"its hook tactbench_{self.kind}s does not give {self.name!r} again: {error}"
-            raise CheckFailed(self.module, text) from error
+            raise CheckFailed(
+                self.module, f"its hook does not give the {self.kind} {self.name!r} again: {error}"
+            ) from error
 
     @property
     def spec(self) -> Any:
@@ -194,8 +194,6 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
-        if isinstance(error, KeyError) and subject.kind == "sensor" and hasattr(subject.spec, "parameters"):
-            field = f"spec.parameters{sorted(subject.spec.parameters)}, {field}"
         raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
 
 
@@ -239,8 +237,7 @@ _STATES: dict[str, Callable[[], Any]] = {
 def unchanged(subject: Subject) -> Iterator[None]:
     """Fail where a plugin's code changes what it shares with all others, prints, or lets a thread of a driver run on.
 
-    A generator that is seeded has other words of state; one that is drawn from keeps them, for the first 624 draws
-    from position 0. Libraries draw some.
+    A generator that is drawn from keeps its words of state for 624 draws from position 0: libraries draw some.
     """
     state = np.random.get_state(legacy=False)  # noqa: NPY002
     state["state"]["pos"] = 0

@@ -15,12 +15,8 @@ from tactbench.devices.positioner import NotReadyError, Positioner
 PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
 PACE = {"speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-5, "retreat_speed_m_s": 5e-3}
 """Options of the axis where its descriptor's `emulated_options` state no others; homing finds the lower end."""
-HOMING_S = 120.0
-"""Homing takes no longer (assumed: 100 mm at 1 mm/s, and back)."""
-MOVE_S = 2.0
-"""A move of the checks takes about so long at most: an axis of a metre at 1 mm/s is not tried over all of it."""
-LOOK_S, REST_S = 1e-3, 0.3
-"""Between two looks at a moving axis, and for how long it must stand where it has ended."""
+HOMING_S, MOVE_S = 120.0, 2.0  # at most (assumed: 100 mm at 1 mm/s, and back); long axes are moved over a part alone
+LOOK_S, REST_S = 1e-3, 0.3  # between two looks at a moving axis, and for how long it must stand where it has ended
 
 
 class _Axis(NamedTuple):
