@@ -111,9 +111,7 @@ class Subject:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
             return next(one for one in offered if one.name == self.name)
         except (PluginError, KeyError, StopIteration) as error:
-            raise CheckFailed(
-                self.module, f"its hook does not give the {self.kind} {self.name!r} again: {error}"
-            ) from error
+            raise CheckFailed(self.module, f"its hook does not give {self.name!r} again: {error}") from error
 
     @property
     def spec(self) -> Any:
@@ -214,23 +212,22 @@ def code_names_resolve(subject: Subject) -> None:
 
     Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
     """
-    named = {field: where for field in CODE if (where := subject.names_code(field))}
+    named = [field for field in CODE if subject.names_code(field)]
     if not named:
         skip("its descriptor names no code")
-    for field, where in named.items():
+    for field in named:
         with code_of(field, subject):
-            found = subject.code(field)
-        if not callable(found):
-            fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
+            subject.code(field)
 
 
-_STATES: dict[str, Callable[[], Any]] = {
-    "the seed of numpy's global generator": lambda: np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
-    "the seed of Python's global generator": lambda: random.getstate()[1][:-1],
-    "how numpy treats floating-point errors": np.geterr,
-    "the current folder": os.getcwd,
-}
-"""What all code of a process shares."""
+def _shared() -> dict[str, Any]:
+    """Return what all code of a process shares."""
+    return {
+        "the seed of numpy's global generator": np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
+        "the seed of Python's global generator": random.getstate()[1][:-1],
+        "how numpy treats floating-point errors": np.geterr(),
+        "the current folder": Path.cwd(),
+    }
 
 
 @contextmanager
@@ -244,10 +241,10 @@ def unchanged(subject: Subject) -> Iterator[None]:
     np.random.set_state(state)  # noqa: NPY002
     version, (*own, _), following = random.getstate()
     random.setstate((version, (*own, 0), following))
-    before, threads = {name: repr(state()) for name, state in _STATES.items()}, set(threading.enumerate())
+    before, threads = _shared(), set(threading.enumerate())
     with redirect_stdout(io.StringIO()) as printed, np.errstate():
         yield
-        changed = [name for name, state in _STATES.items() if repr(state()) != before[name]]
+        changed = [name for name, state in _shared().items() if state != before[name]]
     if changed:
         fail(subject.package, f"its code changes {changed[0]}: draw from a generator of your own, and set nothing")
     if printed.getvalue():

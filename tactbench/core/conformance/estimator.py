@@ -87,9 +87,6 @@ def seed_and_data_decide(subject: Subject) -> None:
         drawn = subject.descriptor.looks_at == "nothing"
         if not drawn and not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
             fail("predict", "a row asked alone is answered otherwise than among others")
-        fewer = _taught(subject, kind, given=(X[: -ROWS // 4], y[: -ROWS // 4]))(new)
-        if kind == "regression" and not subject.descriptor.baseline and np.array_equal(fewer, together):
-            fail("fit", f"the last quarter of {ROWS} rows makes no difference to any answer")
         _taught(subject, kind, given=(-X, y[::-1].copy()))
         if not np.array_equal(_taught(subject, kind)(new), together):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")

@@ -58,8 +58,8 @@ def recording_fits_the_spec(subject: Subject) -> None:
 def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) -> None:
     """Fail where a recording shows forces beyond a finger's, or another rate, range, rest or sign than `spec`."""
     pressing = None
-    known = [channel for one in meta.reference if one.name in data for channel in one.channels]
-    if any(channel.kind == "force" and channel.name in ("fz", "normal") for channel in known):
+    known = [one for each in meta.reference if each.name in data for one in each.channels]
+    if any(one.kind == "force" and one.name in ("fz", "normal") for one in known):
         pressing, force_n = pressing_force(data, meta.reference)
         size_n = np.abs(force_n[np.isfinite(force_n)])
         loaded = size_n[size_n > LOADED * size_n.max(initial=0.0)]

@@ -64,8 +64,6 @@ def limits_are_in_order(subject: Subject) -> None:
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
             fail(f"{place}.unit", f"a {channel.kind} is measured in {unit} or count, not in {channel.unit}")
         low, high = limits_of(channel)
-        if low >= high:
-            fail(f"{place}.lower", f"{low:g} is not below upper, {high:g}")
         whole = np.iinfo(stream.dtype) if np.dtype(stream.dtype).kind in "iu" else None
         if whole is not None and (low < whole.min or high > whole.max):
             text = f"{low:g} to {high:g}: the converter's ends are needed, and must fit {stream.dtype}"

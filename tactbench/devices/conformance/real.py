@@ -52,10 +52,10 @@ def real_device_answers(subject: Subject) -> None:
         skip("the rig file says that the device is emulated")
     with code_of("driver", subject):
         driver = open_driver(subject.descriptor, entry, time.monotonic_ns)
+    opened = Opened(subject, driver, time.monotonic_ns)
     try:
-        with code_of("driver.identify", subject):
-            driver.identify()
-        found = look_at(Opened(subject, driver, time.monotonic_ns))
+        opened.call("identify")
+        found = look_at(opened)
     finally:
         with suppress(TactbenchError):
             driver.close()
