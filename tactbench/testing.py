@@ -22,6 +22,7 @@ from tactbench.core.conformance.run import CheckReport, checks_of, run_checks, s
 from tactbench.core.plugins.registry import installed
 
 __all__ = ["CheckFailed", "CheckReport", "PluginCheck", "check_plugin", "plugin_checks"]
+MODES: tuple[Mode, ...] = ("passive", "recording")
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,9 @@ class PluginCheck:
             raise CheckFailed(outcome.where, "\n".join(filter(None, (outcome.text, outcome.advice))))
 
 
-def _modes(recording: Path | None) -> tuple[Mode, ...]:
-    return ("passive",) if recording is None else ("passive", "recording")
-
-
 @lru_cache(maxsize=64)
 def _report(subject: Subject, recording: Path | None) -> CheckReport:
-    return run_checks(subject, modes=_modes(recording), recording=recording)
+    return run_checks(subject, modes=MODES if recording else MODES[:1], recording=recording)
 
 
 def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginCheck]:
@@ -78,7 +75,7 @@ def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginChe
     return [
         PluginCheck(f"{subject.kind}-{one.name}", partial(_report, subject, recording))
         for subject in subjects_named(installed(), name)
-        for one in checks_of(subject.kind, *_modes(recording))
+        for one in checks_of(subject.kind, *(MODES if recording else MODES[:1]))
     ]
 
 

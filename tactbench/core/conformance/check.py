@@ -46,8 +46,7 @@ HEAVY = frozenset({
 """Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
 
 
-IMPORT_S, THREAD_S = 1.0, 1.0
-"""How long the import of a plugin may take [s of a processor], and how long a thread may take to end."""
+IMPORT_S, THREAD_S = 1.0, 1.0  # a plugin's import may take so long [s of a processor], and a thread to end
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -112,8 +111,7 @@ class Subject:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
             return next(one for one in offered if one.name == self.name)
         except (PluginError, KeyError, StopIteration) as error:
-            text = f"its hook tactbench_{self.kind}s does not give {self.name!r} again: {error}"
-            raise CheckFailed(self.module, text) from error
+            raise CheckFailed(self.module, f"its hook does not give {self.name!r} again: {error}") from error
 
     @property
     def spec(self) -> Any:
@@ -194,8 +192,6 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
-        if isinstance(error, KeyError) and subject.kind == "sensor" and hasattr(subject.spec, "parameters"):
-            field = f"spec.parameters{sorted(subject.spec.parameters)}, {field}"
         raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
 
 
@@ -216,41 +212,39 @@ def code_names_resolve(subject: Subject) -> None:
 
     Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
     """
-    named = {field: where for field in CODE if (where := subject.names_code(field))}
+    named = [field for field in CODE if subject.names_code(field)]
     if not named:
         skip("its descriptor names no code")
-    for field, where in named.items():
+    for field in named:
         with code_of(field, subject):
-            found = subject.code(field)
-        if not callable(found):
-            fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
+            subject.code(field)
 
 
-_STATES: dict[str, Callable[[], Any]] = {
-    "the seed of numpy's global generator": lambda: np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
-    "the seed of Python's global generator": lambda: random.getstate()[1][:-1],
-    "how numpy treats floating-point errors": np.geterr,
-    "the current folder": os.getcwd,
-}
-"""What all code of a process shares."""
+def _shared() -> dict[str, Any]:
+    """Return what all code of a process shares."""
+    return {
+        "the seed of numpy's global generator": np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
+        "the seed of Python's global generator": random.getstate()[1][:-1],
+        "how numpy treats floating-point errors": np.geterr(),
+        "the current folder": Path.cwd(),
+    }
 
 
 @contextmanager
 def unchanged(subject: Subject) -> Iterator[None]:
     """Fail where a plugin's code changes what it shares with all others, prints, or lets a thread of a driver run on.
 
-    A generator that is seeded has other words of state; one that is drawn from keeps them, for the first 624 draws
-    from position 0. Libraries draw some.
+    A generator that is drawn from keeps its words of state for 624 draws from position 0: libraries draw some.
     """
     state = np.random.get_state(legacy=False)  # noqa: NPY002
     state["state"]["pos"] = 0
     np.random.set_state(state)  # noqa: NPY002
     version, (*own, _), following = random.getstate()
     random.setstate((version, (*own, 0), following))
-    before, threads = {name: repr(state()) for name, state in _STATES.items()}, set(threading.enumerate())
+    before, threads = _shared(), set(threading.enumerate())
     with redirect_stdout(io.StringIO()) as printed, np.errstate():
         yield
-        changed = [name for name, state in _STATES.items() if repr(state()) != before[name]]
+        changed = [name for name, state in _shared().items() if state != before[name]]
     if changed:
         fail(subject.package, f"its code changes {changed[0]}: draw from a generator of your own, and set nothing")
     if printed.getvalue():

@@ -18,10 +18,8 @@ from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.mapping.model import Mapping
 from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
-MOST_READ = 40
-"""Recordings that are looked at, evenly over all."""
-LONE, LONE_SHARE = 2.0, 0.02
-"""Ranges of the other readings by which one value stands apart, and the share of rows that has it: a sentinel."""
+MOST_READ = 40  # recordings that are looked at, evenly over all
+LONE, LONE_SHARE = 2.0, 0.02  # a sentinel stands so many ranges apart from all others, in such a share of rows
 
 
 def _mapping(subject: Subject) -> Mapping:
@@ -50,9 +48,8 @@ def tasks_can_be_answered(subject: Subject) -> None:
             fail("source.tasks", f"there is no task {name!r}{f'; did you mean {close[0]}?' if close else ''}")
         spec: TaskSpec = subject.registry.tasks[name].spec
         if isinstance(spec.target, LabelTarget) and spec.target.name not in labels:
-            fail(
-                "source.tasks", f"{name} asks for the label {spec.target.name}; there is {', '.join(labels) or 'none'}"
-            )
+            there = ", ".join(labels) or "none"
+            fail("source.tasks", f"{name} asks for the label {spec.target.name}; there is {there}")
         kind = getattr(spec.target, "kind", None)
         if kind is not None and kind not in known | (sensed if isinstance(spec.target, VectorTarget) else set()):
             fail("source.tasks", f"{name} asks for a {kind}, which no reference stream has")
@@ -72,12 +69,8 @@ def readings_are_as_stated(subject: Subject) -> None:
     """
     mapping, data_set = _mapping(subject), DataSet(Path(subject.module))
     first = "" if mapping.source is None else next(iter(mapping.source.files))
-    places = [
-        subject.root,
-        *(subject.root.iterdir() if subject.root else ()),
-        data_set.files,
-        Path(subject.module).parent,
-    ]
+    own = (subject.root, *subject.root.iterdir()) if subject.root else ()
+    places = (*own, data_set.files, Path(subject.module).parent)
     root = next((one for one in places if one is not None and first and (one / first).is_file()), None)
     if first and root is None:
         skip("its files are not here, and none is fetched: `--root DIR` names a folder that holds a copy")
@@ -97,21 +90,14 @@ def readings_are_as_stated(subject: Subject) -> None:
             for name, stream in made.came.items():
                 for column, channel in enumerate(stream.spec.channels):
                     values = good(stream)[:, column]
-                    lone = _lone(values[np.isfinite(values)])
-                    if lone is not None and channel.kind in ("force", "torque"):
-                        where = f"streams.{name}.channels[{channel.name}].sentinels"
-                        fail(
-                            where, f"{lone:g} {channel.unit} in {imported.meta.name} is far from all others: no sample?"
-                        )
+                    values = values[np.isfinite(values)]
+                    if channel.kind not in ("force", "torque") or len(values) < 1 / LONE_SHARE:
+                        continue
+                    low, high = np.quantile(values, (LONE_SHARE, 1 - LONE_SHARE))
+                    apart = np.unique(values[np.abs(values - (low + high) / 2) > (LONE + 0.5) * (high - low)])
+                    if len(apart) == 1 and high > low:
+                        text = f"{apart[0]:g} {channel.unit} in {imported.meta.name} is far from all others: no sample?"
+                        fail(f"streams.{name}.channels[{channel.name}].sentinels", text)
     lacking = [one for one in ("train", "test") if set(roles) != {None} and one not in roles]
     if lacking:
         fail("recording.role", f"no recording has the role {lacking[0]}")
-
-
-def _lone(values: np.ndarray) -> float | None:
-    """Return the one value that stands apart from all others; None: there is none."""
-    if len(values) < 1 / LONE_SHARE:
-        return None
-    low, high = np.quantile(values, (LONE_SHARE, 1 - LONE_SHARE))
-    apart = np.unique(values[(values < low - LONE * (high - low)) | (values > high + LONE * (high - low))])
-    return float(apart[0]) if len(apart) == 1 and high > low else None

@@ -13,15 +13,10 @@ from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 Answer = Callable[[Any], Any]
 
 ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 400, 40, 7, 3, 1
-FEW_ROWS = 40
-"""Of few shots: a protocol that teaches a handful of presses gives no more."""
-LEVEL = 5.0
-"""Mean of the answers: forces do not lie about 0."""
-BETTER = 0.9
-"""Of the error of the mean (or of the commonest class), that an answer which uses the features stays below: the
-question is linear with a tenth of noise, so that the worst of ours is at half."""
-SAME_ROW = 1e-6
-"""Relative difference of one row answered alone and among others: sums of another order, and nothing else."""
+FEW_ROWS = 40  # of few shots: a protocol that teaches a handful of presses gives no more
+LEVEL = 5.0  # mean of the answers: forces do not lie about 0
+BETTER = 0.9  # of the trivial answer's error: the question is linear with a tenth of noise, and ours are at half
+SAME_ROW = 1e-6  # relative difference of one row answered alone and among others: sums of another order
 
 
 def question(kind: str) -> list[Any]:
@@ -73,9 +68,8 @@ def answers_have_the_shape(subject: Subject) -> None:
     descriptor = subject.descriptor
     for name, candidates in descriptor.grid.items():
         for one in candidates:
-            _taught(
-                subject, descriptor.kinds[0], {**(descriptor.rehearsal or {}), name: one}, f"grid[{name}] = {one!r}: "
-            )
+            params = {**(descriptor.rehearsal or {}), name: one}
+            _taught(subject, descriptor.kinds[0], params, f"grid[{name}] = {one!r}: ")
 
 
 @check("estimator", needs="answers-have-the-shape")
@@ -93,9 +87,6 @@ def seed_and_data_decide(subject: Subject) -> None:
         drawn = subject.descriptor.looks_at == "nothing"
         if not drawn and not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
             fail("predict", "a row asked alone is answered otherwise than among others")
-        fewer = _taught(subject, kind, given=(X[: -ROWS // 4], y[: -ROWS // 4]))(new)
-        if kind == "regression" and not subject.descriptor.baseline and np.array_equal(fewer, together):
-            fail("fit", f"the last quarter of {ROWS} rows makes no difference to any answer")
         _taught(subject, kind, given=(-X, y[::-1].copy()))
         if not np.array_equal(_taught(subject, kind)(new), together):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")

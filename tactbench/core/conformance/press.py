@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -26,7 +27,7 @@ from tactbench.core.conformance.streams import (
 from tactbench.core.errors import UsageError, nearest
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.interfaces import Reason
-from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.samples import FloatArray, Quality
 from tactbench.core.spec import units
@@ -37,32 +38,16 @@ from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Environment, Indenter, Scene, Simulation, Slide
 from tactbench.core.spec.sensor import ChannelKind
 
-FORCE_N = 0.5
-"""At the end of the press: every sensor that is touched by a hand bears it."""
-REAL_N = 1.0
-"""And on a rig of real devices: a motor with friction still follows it, and no fingertip is harmed."""
-SECONDS, LATE = 1.0, 0.5
-"""How long it lasts; and by which share more or less for a rig that begins later."""
-NOISE_N = 0.005
-"""Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
-MOST_SATURATED = 0.5
-"""Share of the samples of a press over the task's range that a taxel may stand at a limit."""
-LEAST_RISE = 0.02
-"""Share of its whole change by which a channel goes on in the upper part of its range (assumed: foams harden)."""
-ALWAYS_WANTED = ("stored", "reference-force")
-"""What every recording needs, beside the kinds of channels that are observed."""
-REACH_MM = 15.0
-"""Half of the side of the plane over which heights are looked at: no skin here is wider."""
-EFFECT_N = 2.0
-"""At the end of a press with an effect: some begin with a load."""
-ASKED = 8
-"""How often an effect is asked whether a scene calls for it: what is drawn then shows."""
-FLAT = 2e-3
-"""Share of its largest dimension by which a body rises at least as far from its lowest point as that dimension."""
-LOWEST_MM = 1e-9
-"""By which the lowest point may miss 0: rounding of millimetres, and nothing that a skin feels."""
-MOST_N = 100.0
-"""Beyond the rated range of every tactile sensor of a finger."""
+FORCE_N, REAL_N, EFFECT_N = 0.5, 1.0, 2.0  # every sensor bears the first; motors follow the second; effects need load
+NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws can be told apart
+SECONDS, LATE = 1.0, 0.5  # how long a press lasts; by which share more or less for a rig that begins later
+MOST_SATURATED = 0.5  # share of the samples of a press that a taxel may stand at a limit
+LEAST_RISE = 0.02  # of its whole change, in the upper part of a channel's range (assumed: foams harden)
+ALWAYS_WANTED = ("stored", "reference-force")  # what every recording needs, beside the kinds of channels
+REACH_MM, FLAT = 15.0, 2e-3  # heights are looked at so far; share of its largest dimension by which a body rises there
+LOWEST_MM = 1e-9  # by which the lowest point may miss 0: rounding
+ASKED = 8  # calls of `called_for` for one scene: what is drawn then shows
+MOST_N = 100.0  # beyond the rated range of every tactile sensor of a finger
 WHY = "a check of plugins"
 
 
@@ -87,7 +72,7 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     descriptor = subject.registry.rigs[subject.registry.first_rig("simulated")]
     context = rig_context(subject.registry)
     if subject.kind == "effect":
-        _WATCHED.update(effect=subject.descriptor, wrong="", changed=False)
+        _WATCHED.update(effect=subject.descriptor, wrong=[], changed=False)
         watching = {"where": f"{__name__}:watched"}
         effects, named = (
             tuple(one.model_copy(update=watching) if one.name == subject.name else one for one in several)
@@ -104,42 +89,32 @@ _WATCHED: dict[str, Any] = {}
 def watched(run: Any, *more: Any) -> Any:
     """Apply the effect that is watched, and look at what it leaves alone and what it changes."""
     effect = _WATCHED["effect"]
+    apply = load_object(effect.where)
     if not hasattr(run, "tracks"):  # called upon while solving
-        return load_object(effect.where)(run, *more)
+        return apply(run, *more)
 
     def state() -> dict[str, Any]:
-        tracks = run.tracks
-        return {
-            "true force (load)": [run.load.force_n, *(one.force_n for one in tracks)],
-            "reference (reference-force)": [run.reference_n],
-            "clock": [run.t_s, *(one.t_s for one in tracks)],
-            "readings": [one.readings for one in tracks],
-            "marks": [one.quality for one in tracks],
-        }
+        return {"true force": [run.load.force_n, *(one.force_n for one in run.tracks)], "reference": [run.reference_n],
+                "clock": [run.t_s, *(one.t_s for one in run.tracks)],
+                "readings": [array for one in run.tracks for array in (one.readings, one.quality)]}  # fmt: skip
 
-    before = {name: [one.copy() for one in arrays] for name, arrays in state().items()}
-    load_object(effect.where)(run)
-    for name, arrays in state().items():
-        same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before[name], arrays, strict=True))
-        if name in ("readings", "marks"):
-            _WATCHED["changed"] |= not same
-        elif not same and not any(f"({token})" in name for token in effect.produces):
-            _WATCHED["wrong"] = f"it changes the {name.partition(' (')[0]}, which its `produces` does not name"
-    for track in run.tracks:
-        bad = np.isnan(track.readings) & ((track.quality & Quality.MISSING) == 0)
-        if bad.any():
-            _WATCHED["wrong"] = f"{track.channels[int(bad.any(axis=0).argmax())].name} is not a number after it"
+    before = copy.deepcopy(state())
+    apply(run)
+    changed = {name for name, arrays in state().items() for a, b in zip(before[name], arrays, strict=True)
+               if not np.array_equal(a, b, equal_nan=True)}  # fmt: skip
+    _WATCHED["changed"] |= "readings" in changed
+    wrong = changed - {"readings", "reference" if "reference-force" in effect.produces else ""}
+    _WATCHED["wrong"] += [f"it changes the {name}, which its `produces` does not name" for name in sorted(wrong)]
+    if any((np.isnan(one.readings) & ((one.quality & Quality.MISSING) == 0)).any() for one in run.tracks):
+        _WATCHED["wrong"].append("a reading is not a number after it, and not marked as MISSING")
     return None
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
     """Return sensors that a simulation can press: of this package, the cheapest first, then of the plugin's own."""
-    able = []
-    for owned in subject.registry.sensors.all_owned():
-        skin = owned.descriptor.spec.skin
-        near = owned.ours or owned.distribution == subject.distribution
-        if near and skin is not None and owned.descriptor.transducer is not None:
-            able.append((not owned.ours, math.prod(skin.sheet.cells), owned.descriptor.name, owned.descriptor))
+    able = [(not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells), one.descriptor.name, one.descriptor)
+            for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
+            if one.descriptor.spec.skin is not None and one.descriptor.transducer is not None]  # fmt: skip
     return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
 
 
@@ -150,13 +125,6 @@ def presses(subject: Subject, scenes: Sequence[Scene], field: str, seed: int = 1
         for sensor in simulated_sensors(subject):
             with suppress(CheckSkipped), code_of(field, subject):
                 yield carried_out(rig, sensor, descriptor, scene, seed)
-
-
-def _pressed_by_tasks(registry: Registry) -> Iterator[float]:
-    """Yield the largest force [N] of each scene of our tasks whose answer is a force."""
-    for owned in registry.tasks.all_owned():
-        if owned.ours and getattr(owned.descriptor.spec.target, "kind", "") == "force":
-            yield from (planned.scene.profile.largest_n for planned in owned.descriptor.spec.scenes)
 
 
 def _own_range_n(subject: Subject) -> float:
@@ -171,7 +139,10 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press: of a sensor on a simulated rig over the range of tasks of force, or of a rig, a tiny one."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        end_n = _own_range_n(subject) or max(_pressed_by_tasks(subject.registry), default=FORCE_N)
+        tasks = [one.descriptor.spec for one in subject.registry.tasks.all_owned() if one.ours]
+        forces = [one.scene.profile.largest_n for task in tasks if getattr(task.target, "kind", "") == "force"
+                  for one in task.scenes]  # fmt: skip
+        end_n = _own_range_n(subject) or max(forces, default=FORCE_N)
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
@@ -186,51 +157,32 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
 
 @check("sensor", "rig", needs="transducer-reads rest-is-as-stated code-names-resolve")
 def press_is_recorded(subject: Subject) -> None:
-    """A recording has a column a channel, numbers only, and times by which rows are put on one clock.
+    """A recording has a column a channel, numbers within their limits, and times by which rows are put on one clock.
 
-    Yield blocks of shape (n, channels) for streams that the acquisition names; mark what means nothing as MISSING;
-    count t_ns on in whole nanoseconds, and state the rate in samples a second.
+    Yield blocks of shape (n, channels) for streams that the acquisition names; count t_ns on in whole nanoseconds, and
+    state the rate in samples a second. Clip to lower and upper, mark those samples as SATURATED, others that mean
+    nothing as MISSING, and look at the units of the sensitivity: a SkinState has N, mm and MPa.
     """
     made = pressed(subject)
     for name, stream in made.came.items():
         times_are_right(f"streams: {name}", stream, SECONDS, LATE)
-
-
-@check("sensor", "rig", needs="press-is-recorded")
-def limits_are_kept(subject: Subject) -> None:
-    """A converter gives nothing beyond its ends, and what stands at an end tells nothing.
-
-    Clip to lower and upper, mark those samples as Quality.SATURATED, and look at the units of the sensitivity: a
-    SkinState has N, mm and MPa.
-    """
-    made = pressed(subject)
+    upper_n, rises = _own_range_n(subject) if subject.kind == "sensor" else 0.0, list[bool]()
     for spec in made.meta.sensor.streams:
         stream = made.came[spec.name]
         for column, channel in enumerate(spec.channels):
-            where, values = f"streams: {spec.name}.{channel.name}", stream.data[:, column]
-            within_limits(where, channel, values)
+            where = f"streams: {spec.name}.{channel.name}"
+            within_limits(where, channel, stream.data[:, column])
             full = (marks_of(stream)[:, column] & Quality.SATURATED) != 0
             if subject.kind == "sensor" and channel.kind == "taxel" and full.mean() > MOST_SATURATED:
                 fail(where, f"{full.mean():.0%} of its samples stand at a limit in a press over its range of forces")
-    _rises_to_the_end(subject, made)
-
-
-def _rises_to_the_end(subject: Subject, made: Recorded) -> None:
-    """Fail where no taxel goes on changing in the upper part of the range that a sensor's data sheet states."""
-    upper_n = _own_range_n(subject) if subject.kind == "sensor" else 0.0
-    if not upper_n:
-        return
-    pressing, force_n = pressing_force(made.came, made.meta.reference)
-    rises = []
-    for stream in made.came.values():
-        if stream.t_ns is None or pressing.t_ns is None or stream is pressing:
-            continue
-        load = np.interp(stream.t_ns, pressing.t_ns, force_n) / upper_n
-        low, mid, high = (stream.data[(load > one) & (load < one + 0.2)].astype(float) for one in (0.0, 0.6, 0.85))
-        if len(low) and len(mid) and len(high):
-            noise = 3 * np.hypot(mid.std(axis=0) / math.sqrt(len(mid)), high.std(axis=0) / math.sqrt(len(high)))
-            whole, late = (np.abs(high.mean(axis=0) - one.mean(axis=0)) for one in (low, mid))
-            rises.append(bool((late > np.maximum(LEAST_RISE * whole, np.where(whole > noise, 0.0, np.inf))).any()))
+        if upper_n:
+            pressing, force_n = pressing_force(made.came, made.meta.reference)
+            load = np.interp(stream.t_ns, pressing.t_ns, force_n) / upper_n  # type: ignore[arg-type]
+            parts = [stream.data[(load > one) & (load < one + 0.2)].astype(float) for one in (0.0, 0.6, 0.85)]
+            if all(map(len, parts)):
+                low, mid, high = (one.mean(axis=0) for one in parts)
+                felt, late = np.abs(high - low) > parts[-1].std(axis=0), np.abs(high - mid)
+                rises.append(bool((felt & (late > LEAST_RISE * np.abs(high - low))).any()))
     if rises and not any(rises):
         text = f"no channel changes any more between {0.7 * upper_n:.3g} and {upper_n:.3g} N, its own range"
         fail("spec.data_sheet.force_range", text)
@@ -259,11 +211,7 @@ def differing(one: Recorded, other: Recorded) -> list[str]:
 
 
 def _effected(subject: Subject, seed: int = 1) -> Recorded:
-    """Return a tiny press with the effect asked for by name, and those of its distribution that it consumes.
-
-    It slides, under force control, on a sensor that is colder than the indenter; plainly where no sensor may; on the
-    first sensor of which it changes a reading, or else on the first.
-    """
+    """Return a press with the effect, on the first sensor of which it changes a reading, or else on the first."""
     siblings = (one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution)
     words = [one.descriptor.name for one in siblings if set(subject.descriptor.consumes) & set(one.descriptor.produces)]
     sensors = simulated_sensors(subject)
@@ -303,20 +251,15 @@ def it_is_applied(subject: Subject) -> None:
     if not wanted.intersection(produced):
         close = nearest(produced[0], wanted) if produced else []
         fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
-    unknown = sorted(
-        set(subject.descriptor.consumes) - {one for each in subject.registry.effects for one in each.produces}
-    )
+    unknown = sorted(set(subject.descriptor.consumes) - {t for one in subject.registry.effects for t in one.produces})
     if unknown:
         fail(f"consumes[{unknown[0]}]", "no installed effect produces it")
     made = _effected(subject)
     plain = {*get_args(ChannelKind), "disturbance", "reading", "stored"}.issuperset(produced)
     if plain and _WATCHED["wrong"]:
-        fail("where", _WATCHED["wrong"])
+        fail("where", _WATCHED["wrong"][0])
     if plain and not _WATCHED["changed"]:
         fail("where", "no reading is another one after it: does it change a copy, or an amount that is 0?")
-    (entry,) = [one for one in made.meta.plan if one.effect == subject.name]
-    if not (entry.included or entry.asked):  # the solve may leave out what it was lent and did not need
-        fail("produces", "it was asked for by name, and the plan left it out: nothing needs what it produces")
     changed = differing(made, _effected(subject))
     if changed:
         fail(f"where: {changed[0]}", "another press with the same seed gives other samples")
@@ -359,26 +302,23 @@ def indenter_is_pressed(subject: Subject) -> None:
     if not np.array_equal(found, heights()):
         fail("where", "it gives other heights for the same places when it is called again")
     for name, one in numbers.items():
-        others = {max(one.least, share * one.default or share) for share in (0.7, 1.4)}
-        others = {value if one.most is None else min(value, one.most) for value in others} - {one.default}
-        changes = []
-        for value in others:
+        most, changes = math.inf if one.most is None else one.most, []
+        others = {min(max(one.least, share * one.default or share), most) for share in (0.7, 1.4)}
+        for value in others - {one.default}:
             with suppress(UsageError):  # dimensions that do not go with each other
                 changes.append(not np.array_equal(heights(**{name: value}), found))
         if changes and not any(changes):
             fail(f"dimensions[{name}]", "the heights are the same whatever it is")
     away = np.hypot(line[:, None], line[None, :])
     largest_mm, body = max(lengths, default=0.0), found > LOWEST_MM
-    if largest_mm and found[away <= 1.5 * largest_mm].max() < FLAT * largest_mm:
-        text = f"{found[away <= 1.5 * largest_mm].max():.2g} mm high within {1.5 * largest_mm:g} mm"
-        fail("where", f"{text}, 1.5 of its largest dimension: are x_mm and y_mm read in millimetres?")
+    highest_mm = found[away <= 1.5 * largest_mm].max()
+    if highest_mm < FLAT * largest_mm:
+        text = f"{highest_mm:.2g} mm high within 1.5 of its largest dimension, {largest_mm:g} mm"
+        fail("where", f"{text}: are x_mm and y_mm read in millimetres?")
     if body.any() and body[(away > 0) & (away <= away[body].max())].all() and not body[0].any():
-        fail(
-            "where", f"its height is 0 again beyond {away[body].max():.3g} mm: 50 mm or more is needed where no body is"
-        )
-    dimensions = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
-    scene = tiny_scene(indenter=Indenter(shape=subject.name, dimensions=dimensions))
-    next(presses(subject, (scene,), "where"))
+        fail("where", f"it is 0 mm high beyond {away[body].max():.3g} mm: 50 mm or more is needed where no body is")
+    default = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
+    next(presses(subject, (tiny_scene(indenter=Indenter(shape=subject.name, dimensions=default)),), "where"))
 
 
 @check("profile", needs="code-names-resolve")

@@ -21,13 +21,10 @@ from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import SensorSpec
 
-LARGEST_N, MOST_N, LOADED = 1000.0, 100.0, 0.2
-"""No fingertip is pressed with more, nor for half of the time; a press of 10 N in gram-force reads 1020. Loaded is what
-has this share of the largest force."""
-FAR, FAR_IN_RANGE = 1.0, 0.25
-"""Spans of its readings, and shares of its range, by which a channel's stated rest may lie beyond them."""
-CLEAR = 0.5
-"""Correlation of a taxel with the force from which on its sign can be told."""
+LARGEST_N, MOST_N = 1000.0, 100.0  # at most, and in the median: a press of 10 N in gram-force reads 1020
+LOADED = 0.2  # share of the largest force
+FAR, FAR_IN_RANGE = 1.0, 0.25  # spans of readings, and shares of the range, by which a stated rest may lie off them
+CLEAR = 0.5  # correlation of a taxel with the force from which on its sign can be told
 
 
 @lru_cache(maxsize=2)
@@ -61,8 +58,8 @@ def recording_fits_the_spec(subject: Subject) -> None:
 def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) -> None:
     """Fail where a recording shows forces beyond a finger's, or another rate, range, rest or sign than `spec`."""
     pressing = None
-    known = [channel for one in meta.reference if one.name in data for channel in one.channels]
-    if any(channel.kind == "force" and channel.name in ("fz", "normal") for channel in known):
+    known = [one for each in meta.reference if each.name in data for one in each.channels]
+    if any(one.kind == "force" and one.name in ("fz", "normal") for one in known):
         pressing, force_n = pressing_force(data, meta.reference)
         size_n = np.abs(force_n[np.isfinite(force_n)])
         loaded = size_n[size_n > LOADED * size_n.max(initial=0.0)]

@@ -143,15 +143,11 @@ def run_checks(
     ----------
     modes
         Which checks. Where only a recording is read, the plugin's code is not imported.
-    recording, rig_file
-        What the modes `recording` and `invasive` read.
-    operator
-        Who stands at the rig in the mode `invasive`; None: nobody.
-    root
-        A folder that holds the files of a data set.
+    recording, rig_file, operator, root
+        As :class:`Subject` has them.
     isolated
-        Whether in a child process; else in this one, for plugins that are trusted. Checks of the mode `invasive` are
-        always run in this one, and without a limit of time: an interrupt must reach the rig.
+        Whether in a child process. Checks of the mode `invasive` are always run in this one, and without a limit of
+        time: an interrupt must reach the rig.
     without
         Names of checks that are left out.
     """
@@ -167,10 +163,9 @@ def run_checks(
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
-    here = _Trier(subject, outcomes)
     for one in checks:
         if one.mode == "invasive":
-            here(one.name)
+            _Trier(subject, outcomes)(one.name)
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
 
 

@@ -13,8 +13,7 @@ from tactbench.core.spec import units
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec, Vector
 from tactbench.core.spec.skin import BondedLayer, FoamPad, SkinSheet
 
-LARGEST_M = 0.5
-"""Farthest distance of the outermost taxels [m]: the skin of a forearm is 0.3 m long."""
+LARGEST_M = 0.5  # farthest distance of the outermost taxels: the skin of a forearm is 0.3 m long
 OF_KIND = {
     "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa", "dc_temperature": "K",
     "joint": "rad",
@@ -22,20 +21,11 @@ OF_KIND = {
 """A unit of what a kind of channel measures."""
 RAW = ("count", "V", "mV")
 FASTEST_HZ, SLOWEST_HZ = 1e6, 0.1
-SOONEST_S, LATEST_S = 20e-6, 0.25
-"""Least and largest delay of a link (assumed: a word on an SPI bus takes some microseconds, a radio link 0.1 s)."""
-SPREAD, FEW = 0.2, 3
-"""Share of the skin's longer side that the taxels' longer side has at least, and places from which that is told."""
-PRESS_N, PRESS_MM = 1.0, 2.5
-"""A press of a flat punch of this radius: a fingertip's contact."""
-LEAST_MM = 1e-3
-"""By which such a press indents any skin that is soft enough to be one."""
-EDGE_MM = 1e-6
-"""Rounding of a position in metres."""
-UNIT_NORMAL = 1e-3
-"""Data sheets state normals to three decimals."""
-INWARD = -0.5
-"""Cosine between a stated normal and the sheet's own, below which it points into the sensor."""
+SOONEST_S, LATEST_S = 20e-6, 0.25  # of a link's delay (assumed: an SPI word takes microseconds, a radio link 0.1 s)
+SPREAD, FEW = 0.2, 3  # share of the skin's longer side that taxels reach over, and places from which that is told
+PRESS_N, PRESS_MM, LEAST_MM = 1.0, 2.5, 1e-3  # a press of a flat punch of this radius, and by what it indents a skin
+EDGE_MM, UNIT_NORMAL = 1e-6, 1e-3  # rounding of a position in metres; data sheets state normals to three decimals
+INWARD = -0.5  # cosine between a stated normal and the sheet's own, below which it points into the sensor
 
 
 def on_sheet_mm(sheet: SkinSheet, position_m: Vector) -> tuple[float, float]:
@@ -74,8 +64,6 @@ def limits_are_in_order(subject: Subject) -> None:
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
             fail(f"{place}.unit", f"a {channel.kind} is measured in {unit} or count, not in {channel.unit}")
         low, high = limits_of(channel)
-        if low >= high:
-            fail(f"{place}.lower", f"{low:g} is not below upper, {high:g}")
         whole = np.iinfo(stream.dtype) if np.dtype(stream.dtype).kind in "iu" else None
         if whole is not None and (low < whole.min or high > whole.max):
             text = f"{low:g} to {high:g}: the converter's ends are needed, and must fit {stream.dtype}"

@@ -23,17 +23,11 @@ from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 BAD = Quality.MISSING | Quality.SUSPECT
-RATE_SHARE = 0.02
-"""A rate further from its nominal one is a mistake (assumed: quartz is a hundred times better)."""
-LEAST_ROWS = 20
-"""From which a rate is told."""
-OFF_S = 1.0
-"""How late the last row's time may be: of a device that sends once a second."""
-FORCE_SHARE = 0.2
-"""By which a force at the end of a press may differ: newtons and gram-force differ by a hundred times."""
+RATE_SHARE, LEAST_ROWS = 0.02, 20  # a rate further off is a mistake (assumed: quartz is far better); rows that tell
+OFF_S = 1.0  # how late the last row's time may be: of a device that sends once a second
+FORCE_SHARE = 0.2  # by which a force at the end of a press may differ: newtons and gram-force differ a hundred times
 UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}
-UNITS_OF_FORCE = {102.0: "gram-force", 1000.0: "millinewtons"}
-"""By what a reading in newtons is multiplied."""
+UNITS_OF_FORCE = {102.0: "gram-force", 1000.0: "millinewtons"}  # by what a reading in newtons is multiplied
 
 
 class Recorded(NamedTuple):

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
+import numpy as np
 from pydantic import BaseModel
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
@@ -15,21 +16,15 @@ from tactbench.core.conformance.sensor_spec import OF_KIND
 from tactbench.core.errors import nearest
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import Quantity, assumed
-from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, TaskSpec
 
-REFERENCE = ("force", "torque", "position")
-"""Kinds of channels of which references are made: among the features they give labels away."""
-PARTS = ("indenter", "placement", "profile", "slide", "environment")
-"""Of a scene, that a label may be about."""
-LEAST_SCENES = 5
-"""From so many scenes, or labels, it is no chance that a number rises with a label."""
-LEAST_M, LARGEST_M = 1e-5, 1.0
-"""Radii of caps that are pressed on a sensor."""
-LEAST_FORCE = 0.05
-"""Of a target's unit, that scenes reach at least."""
-GROUPS = ("recording", "unit", "trial", "press", "object", "block")
-"""Groups beside labels that recordings have or that mappings of this package give them."""
+REFERENCE = ("force", "torque", "position")  # channels of which references are made: features give labels away
+PARTS = ("indenter", "placement", "profile", "slide", "environment")  # of a scene, that a label may be about
+LEAST_SCENES = 5  # or labels, from which it is no chance that a number rises with a label
+LEAST_M, LARGEST_M = 1e-5, 1.0  # radii of caps that are pressed on a sensor
+LEAST_FORCE = 0.05  # of a force target's unit, that scenes reach at least
+GROUPS = ("recording", "unit", "trial", "press", "object", "block")  # beside labels, of recordings or our mappings
 
 
 def _planned(spec: TaskSpec) -> Iterator[tuple[str, PlannedScene]]:
@@ -131,31 +126,21 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
     taught = classes.get("train", set())
     if spec.kind == "regression" and len(taught) == 1:
         fail("spec.scenes", f"role train teaches one value alone: {min(map(str, taught))}")
-    _scenes_differ(spec)
-    if isinstance(spec.target, LabelTarget):
+    for role, found in classes.items() if spec.kind == "classification" and taught else ():
+        if found - taught or len(taught) < 2:
+            strange = ", ".join(sorted(map(str, found - taught))) or "one class alone"
+            fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
+    if isinstance(spec.target, LabelTarget) and spec.scenes:
         _label_is_one_thing(spec, spec.target)
-    if spec.kind == "classification" and taught:
-        for role, found in classes.items():
-            if found - taught or len(taught) < 2:
-                strange = ", ".join(sorted(map(str, found - taught))) or "one class alone"
-                fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
-
-
-def _scenes_differ(spec: TaskSpec) -> None:
-    """Fail where a test repeats what was taught, or where every session of the tests is one of training."""
-    of_role: dict[str, dict[str, Scene]] = {}
-    for planned in spec.scenes if "roles" in spec.splits else ():
-        same = planned.scene.model_copy(update={"name": "", "starts_after_s": 0.0})
-        of_role.setdefault(planned.role, {})[planned.scene.name] = same
-    tests, training = of_role.get("test", {}), of_role.get("train", {})
-    for name, scene in tests.items():
-        twins = [other for other, one in training.items() if one == scene]
-        if twins:
-            fail(
-                f"spec.scenes[{name}]", f"it is {twins[0]} once more, in the same session: the test is what was taught"
-            )
-    sessions = {one.session for one in tests.values()}
-    if sessions and len(spec.scenes) > 2 and sessions <= {one.session for one in training.values()}:
+    if "roles" not in spec.splits or missing:
+        return
+    tests, training = ([one.scene for one in spec.scenes if one.role == role] for role in ("test", "train"))
+    same = [one.model_copy(update={"name": "", "starts_after_s": 0.0}) for one in training]
+    for scene in tests:
+        if scene.model_copy(update={"name": "", "starts_after_s": 0.0}) in same:
+            fail(f"spec.scenes[{scene.name}]", "a scene of training is the same, in the same session")
+    sessions = {one.session for one in tests}
+    if len(spec.scenes) > 2 and sessions <= {one.session for one in training}:
         fail("spec.scenes.session", f"every test session is one of training: {', '.join(sorted(sessions))}")
 
 
@@ -163,11 +148,8 @@ def _leaves(given: Any, way: str) -> Iterator[tuple[str, Any]]:
     """Yield the numbers (SI) and texts of a scene's part by their places."""
     if isinstance(given, Quantity):
         yield way, given.value * units.parse(given.unit)[0]
-    elif isinstance(given, BaseModel):
-        for name in type(given).model_fields:
-            yield from _leaves(getattr(given, name), f"{way}.{name}")
-    elif isinstance(given, Mapping):
-        for name, one in given.items():
+    elif isinstance(given, BaseModel | Mapping):
+        for name, one in dict(given).items():
             yield from _leaves(one, f"{way}.{name}")
     elif isinstance(given, str | int | float):
         yield way, given
@@ -175,49 +157,40 @@ def _leaves(given: Any, way: str) -> Iterator[tuple[str, Any]]:
 
 def _label_is_one_thing(spec: TaskSpec, target: LabelTarget) -> None:
     """Fail where a label goes with two parts of the scenes, so that either gives it away, or is in another unit."""
-    found = [(planned.scene.labels[target.name], planned.scene) for planned in spec.scenes]
-    labels = [label for label, _ in found]
+    scenes = [planned.scene for planned in spec.scenes]
+    labels: list[Any] = [scene.labels[target.name] for scene in scenes]
     told: dict[str, str] = {}
     for part in PARTS:
-        columns = [dict(_leaves(getattr(scene, part), part)) for _, scene in found]
-        for way in columns[0] if columns else ():
+        columns = [dict(_leaves(getattr(scene, part), part)) for scene in scenes]
+        for way in columns[0]:
             values = [column.get(way) for column in columns]
-            if len(set(values)) < 2:
+            if None in values or len(set(values)) < 2:
                 continue
             if _go_together(labels, values):
                 told.setdefault(part, way)
-            if spec.kind == "regression" and (spec.metric in ("rmse", "mae") or "unit" in target.model_fields_set):
-                unit = target.unit if "unit" in target.model_fields_set else spec.unit
-                _in_its_unit(target.name, unit, way, labels, values)
-    if len(found) >= LEAST_SCENES and len(told) > 1:
+            unit = target.unit if "unit" in target.model_fields_set else spec.unit
+            pairs = [(label, value) for label, value in zip(labels, values, strict=True) if value]
+            if spec.kind != "regression" or unit == "1" or len(pairs) < 2 or isinstance(values[0], str):
+                continue
+            factors = [label * units.parse(unit)[0] / value for label, value in pairs]
+            power = math.log10(abs(factors[0]) or 1.0)
+            alike = np.allclose(factors, factors[0], rtol=1e-6, atol=0)
+            if alike and abs(power) > 0.5 and math.isclose(power, round(power), abs_tol=1e-6):
+                text = f"{pairs[0][0]:g} {unit} where {way} is {pairs[0][1]:g} (SI): which unit?"
+                fail(f"spec.scenes.labels[{target.name}]", text)
+    if len(scenes) >= LEAST_SCENES and len(told) > 1:
         text = f"{target.name} goes with {' and with '.join(told.values())}: either gives it away"
         fail("spec.scenes", f"{text}; vary one of them independently")
 
 
 def _go_together(labels: Sequence[Any], values: Sequence[Any]) -> bool:
     """Return whether each label has values of its own: numbers that rise with it, or fall, or one stretch of them."""
-    numbers = all(isinstance(one, int | float) for one in (*labels, *values))
-    if not numbers:
-        return len(set(zip(labels, values, strict=True))) == len(set(values)) == len(set(labels))
-    if len(set(labels)) < LEAST_SCENES:  # classes
-        runs = [label for label, _ in itertools.groupby(label for _, label in sorted(zip(values, labels, strict=True)))]
-        return len(runs) == len(set(labels))
-    pairs = sorted(set(zip(labels, values, strict=True)))
-    steps = [b[1] - a[1] for a, b in itertools.pairwise(pairs)]
-    return len(pairs) == len(set(labels)) and (min(steps) > 0 or max(steps) < 0)
-
-
-def _in_its_unit(name: str, unit: str, way: str, labels: Sequence[Any], values: Sequence[Any]) -> None:
-    """Fail where labels are a quantity of the scenes times a power of ten."""
-    pairs = [(label, value) for label, value in zip(labels, values, strict=True) if value]
-    if len(pairs) < 2 or not all(isinstance(one, int | float) for pair in pairs for one in pair):
-        return
-    factors = [label * units.parse(unit)[0] / value for label, value in pairs]
-    power = math.log10(abs(factors[0])) if factors[0] else 0.0
-    alike = all(math.isclose(one, factors[0], rel_tol=1e-6) for one in factors)
-    if alike and len({label for label, _ in pairs}) > 1 and abs(power) > 0.5 and abs(power - round(power)) < 1e-6:
-        label, value = pairs[0]
-        fail(f"spec.scenes.labels[{name}]", f"{label:g} {unit} where {way} is {value:g} (SI): which unit?")
+    pairs, distinct = sorted(set(zip(values, labels, strict=True))), len(set(labels))
+    if isinstance(values[0], str) or (distinct >= LEAST_SCENES and isinstance(labels[0], str)):
+        return len(pairs) == len(set(values)) == distinct
+    runs = [label for label, _ in itertools.groupby(label for _, label in pairs)]
+    ordered = distinct < LEAST_SCENES or runs in (sorted(runs), sorted(runs, reverse=True))
+    return len(runs) == distinct <= len(set(values)) and ordered
 
 
 @check("task")
@@ -238,10 +211,8 @@ def scenes_can_be_pressed(subject: Subject) -> None:
             fail(f"{place}.indenter.radius", f"{body.radius} is not within {1e3 * LEAST_M:g} to {1e3 * LARGEST_M:g} mm")
         if force_n > MOST_N:
             fail(f"{place}.profile", f"its largest force is {force_n:g} N: is its unit right?")
-        if (
-            getattr(spec.target, "kind", "") == "force"
-            and force_n / units.conversion(spec.target.unit, "N") < LEAST_FORCE
-        ):
+        force = getattr(spec.target, "kind", "") == "force"
+        if force and force_n / units.conversion(spec.target.unit, "N") < LEAST_FORCE:
             fail("spec.target.unit", f"{force_n:g} N at most is little in {spec.target.unit}: are newtons meant?")
 
 

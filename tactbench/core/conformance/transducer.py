@@ -19,30 +19,19 @@ from tactbench.core.spec.sensor import ChannelSpec, Nuisances
 from tactbench.core.spec.skin import FluidBackedShell, SkinSheet
 
 Place = tuple[float, float]
-GENTLE_N, FIRM_N, OVERLOAD_N = 1.0, 2.0, 100.0
-"""The overload is beyond what any fingertip is pressed with on purpose."""
-SHEAR = 0.3
-"""Tangential over normal force of a press that is dragged: what skin sticks to on most surfaces."""
-MOST_PRESSED = 6
-"""Places that are pressed, evenly spread over the sensor's list: a wrong axis shows at each of them."""
-REST_SHARE, REST_COUNTS = 0.01, 1.0
-"""Of the channel's range that the reading at rest may differ from the stated one, and at least [channel's unit]."""
-AS_STRONG = 0.5
-"""A taxel that answers with this share of the strongest answer may be the one that is pressed: taxels differ in gain,
-and currents or foam carry a press to their neighbours. Swapped or mirrored axes leave a thousandth."""
-SHARES = (0.1, 1.5)
-"""Of a load, that channels in newton may sum to: taxels leave gaps, and some overlap (assumed)."""
+GENTLE_N, FIRM_N, OVERLOAD_N = 1.0, 2.0, 100.0  # the last is beyond what any fingertip is pressed with on purpose
+SHEAR = 0.3  # tangential over normal force of a press that is dragged: what skin sticks to on most surfaces
+MOST_PRESSED = 6  # places, evenly over the sensor's list: a wrong axis shows at each of them
+REST_SHARE, REST_COUNTS = 0.01, 1.0  # of the range, and in the channel's unit, by which the rest may differ
+STAYS = 0.02  # share of a press's way by which the answer moves along at least: swapped axes leave a thousandth
+SHARES = (0.1, 1.5)  # of a load, that channels in newton sum to: taxels leave gaps, and some overlap (assumed)
+PATCH_MM, PATCH_CELLS = 1.25, 1.5  # deviation of a local press: half a fingertip's contact, and so many cells at least
 SHEAR_FIELDS = "reads_shear names no kind of channel, so tangential_displacement_mm and shear_mpa are None"
 
 
 def observed(subject: Subject) -> tuple[ChannelSpec, ...]:
     """Return the channels that the transducer answers for."""
     return tuple(subject.spec.channels("taxel", "dc_pressure"))
-
-
-PATCH_MM, PATCH_CELLS = 1.25, 1.5
-"""Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
-[cells]."""
 
 
 def skin_grid(sheet: SkinSheet) -> SkinGrid:
@@ -81,20 +70,18 @@ def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> Fl
         raise failure from failure.__cause__
     if given.shape != (len(names),) or given.dtype.kind not in "fiu":
         fail("transducer", f"{given.dtype} of shape {given.shape} for {len(names)} channels asked for")
-    bad = [name for name, value in zip(names, given, strict=True) if not np.isfinite(value)]
-    if bad:
-        fail("transducer", f"{', '.join(bad[:4])} of {len(names)} channels not finite at {state.force_n:g} N")
+    if not np.isfinite(given).all():
+        bad = names[int(np.argmin(np.isfinite(given)))]
+        fail("transducer", f"{bad} of {len(names)} channels not finite at {state.force_n:g} N")
     return given.astype(np.float64)
 
 
 def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged: Place = (0, 0)) -> SkinState:
     """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
 
-    No equation is solved: it is a state that a transducer must be able to read, and that touches one place only; None:
-    the first that is pressed. The dent goes a third of the way through the skin at 1 N and further in proportion, never
-    through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s, for a sensor
-    that reads shear: it moves the dent by a third of that share of its depth, and the press alone moves the skin away
-    from its middle by as much.
+    No equation is solved. The dent goes a third of the way through the skin at 1 N and further in proportion, never
+    through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s: it moves the
+    dent by a third of that share of its depth, and the press alone moves the skin away from its middle by as much.
     """
     skin, grid, at_mm = subject.spec.skin, skin_grid(subject.spec.skin.sheet), at_mm or _places(subject)[0]
     sigma = patch_mm(grid)
@@ -192,9 +179,8 @@ def transducer_has_no_memory(subject: Subject) -> None:
         fail("transducer", f"{observed(subject)[changed[0]].name} reads another value for the same state")
     names = [one.name for one in observed(subject)]
     fewer = names[max(1, len(names) // 2) :: -1]
-    for name, value, before in zip(
-        fewer, _read(subject, untouched, tuple(fewer)), first[len(fewer) - 1 :: -1], strict=True
-    ):
+    others = _read(subject, untouched, tuple(fewer))
+    for name, value, before in zip(fewer, others, first[len(fewer) - 1 :: -1], strict=True):
         # A solver may stop elsewhere for fewer channels.
         if not math.isclose(value, before, rel_tol=1e-3, abs_tol=1e-6):
             fail("transducer", f"{name} reads {value:g} asked for in another order, and {before:g} before")
@@ -202,19 +188,25 @@ def transducer_has_no_memory(subject: Subject) -> None:
 
 @check("sensor", needs="transducer-reads")
 def it_answers_to_a_press(subject: Subject) -> None:
-    """A channel that changes by less than its noise and step tells nothing, and looks like a very quiet sensor.
+    """What changes by less than its noise and step tells nothing; newtons that are lost make a sensor too good.
 
-    Look at units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity.
+    Look at units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity. Channels in newton sum
+    pressure over area: 1 MPa on 1 mm2 is 1 N, a gram-force 0.0098 N.
     """
-    known = subject.spec.nuisances
-    own = [known.get(one.kind, Nuisances()) for one in observed(subject)]
+    known, every = subject.spec.nuisances, observed(subject)
+    own = [known.get(one.kind, Nuisances()) for one in every]
     least = np.array([max(one.white.value, one.step.value) for one in own])
-    for change in _responses(subject, GENTLE_N).values():
+    changes = list(_responses(subject, GENTLE_N).values())
+    for change in changes:
         # Elsewhere it may be felt as well, and more: then it is the place that is wrong.
         if not (np.abs(change) > least).any():
             most = int(np.argmax(np.abs(change)))
-            name = observed(subject)[most].name
-            fail("transducer", f"{GENTLE_N:g} N change {name} by {change[most]:.3g}: no more than noise and step")
+            text = f"{GENTLE_N:g} N change {every[most].name} by {change[most]:.3g}: no more than noise and step"
+            fail("transducer", text)
+    forces = [one.unit == "N" for one in every]
+    share = float(np.median([abs(change[forces].sum()) / GENTLE_N for change in changes]))
+    if any(forces) and not SHARES[0] <= share <= SHARES[1]:
+        fail("transducer", f"its channels sum to {share:.3g} N under {GENTLE_N:g} N{likely(share)}")
 
 
 @check("sensor", needs="it-answers-to-a-press")
@@ -226,64 +218,21 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
     sites = _sites(subject)
     if len(sites) < 2:
         skip("it states no places of several taxels")
-    responses = _responses(subject, GENTLE_N)
-    # A neighbour may answer more strongly where the layout is finer than the press.
-    near_mm = 2 * patch_mm(skin_grid(subject.spec.skin.sheet))
-
-    def strength(pressed: Place, there: Place) -> float:
-        return float(max(abs(responses[pressed][column]) for column in sites[there]))
-
-    def named(place: Place) -> str:
-        return f"{observed(subject)[sites[place][0]].name} (x {place[0]:.3g} mm, arc {place[1]:.3g} mm)"
-
-    _moves_along(subject, sites)
-    for at_mm in responses:
-        answering = {there: strength(at_mm, there) for there in sites}
-        felt = {there: strength(there, at_mm) for there in responses}
-        for strengths, text in (
-            (answering, "pressed at {here}, {most} answers most: are axes swapped or mirrored?"),
-            (felt, "{here} answers most to a press at {most}: is position_m read in another unit?"),
-        ):
-            most = max(strengths, key=strengths.__getitem__)
-            if strengths[at_mm] < AS_STRONG * strengths[most] and math.dist(most, at_mm) > near_mm:
-                fail("transducer", text.format(here=named(at_mm), most=named(most)))
-
-
-def _moves_along(subject: Subject, sites: dict[Place, list[int]]) -> None:
-    """Fail where the answer does not move the way a press does, from one end of the taxels to the other, or across."""
     places = np.array(list(sites))
     rest, ends = _read(subject, _state(subject, 0.0)), (places.min(axis=0), places.max(axis=0))
     for axis, name in enumerate(("x", "the arc")):
-        middle = (ends[0] + ends[1]) / 2
         if ends[1][axis] - ends[0][axis] < patch_mm(skin_grid(subject.spec.skin.sheet)) / 2:
             continue
         centres = []
         for end in ends:
-            at = tuple(end[axis] if one == axis else middle[one] for one in (0, 1))
-            change = np.abs(_read(subject, _state(subject, GENTLE_N, at)) - rest)
+            at = (ends[0] + ends[1]) / 2
+            at[axis] = end[axis]
+            change = np.abs(_read(subject, _state(subject, GENTLE_N, tuple(at))) - rest)
             weights = np.array([change[columns].max() for columns in sites.values()])
-            if not weights.any():
-                break
-            centres.append(weights @ places / weights.sum())
-        else:
-            if (centres[1] - centres[0])[axis] <= 0:
-                text = f"pressed further along {name}, its answer moves back: is {name} mirrored, or are axes swapped?"
-                fail("transducer", text)
-
-
-@check("sensor", needs="it-answers-to-a-press")
-def forces_are_the_forces(subject: Subject) -> None:
-    """Channels in newton are compared with the load itself: a lost factor is a sensor a hundred times too good.
-
-    Sum pressure over area: 1 MPa on 1 mm2 is 1 N, a gram-force 0.0098 N.
-    """
-    columns = [column for column, one in enumerate(observed(subject)) if one.unit == "N"]
-    if not columns:
-        skip("none of its channels is in N")
-    sums = [abs(change[columns].sum()) / GENTLE_N for change in _responses(subject, GENTLE_N).values()]
-    share = float(np.median(sums))
-    if not SHARES[0] <= share <= SHARES[1]:
-        fail("transducer", f"its channels sum to {share:.3g} N under {GENTLE_N:g} N{likely(share)}")
+            centres.append(weights @ places[:, axis] / (weights.sum() or math.nan))
+        if centres[1] - centres[0] <= STAYS * (ends[1] - ends[0])[axis]:
+            text = f"pressed further along {name}, its answer stays or moves back: are axes swapped or mirrored?"
+            fail("transducer", f"{text} Is position_m in metres?")
 
 
 @check("sensor", needs="it-answers-to-a-press")
@@ -303,10 +252,8 @@ def sign_is_as_stated(subject: Subject) -> None:
         # A sensor at its end gives the same reading twice; a hundredth is left to solvers.
         if abs(firm[most]) < 0.99 * abs(change[most]):
             name = observed(subject)[most].name
-            text = (
-                f"{name} changes by {change[most]:.3g} under {GENTLE_N:g} N and by {firm[most]:.3g} under {FIRM_N:g} N"
-            )
-            fail("transducer", text)
+            text = f"changes by {change[most]:.3g} under {GENTLE_N:g} N and by {firm[most]:.3g} under {FIRM_N:g} N"
+            fail("transducer", f"{name} {text}")
 
 
 @check("sensor", needs="it-answers-to-a-press")
@@ -318,9 +265,9 @@ def shear_turns_with_its_direction(subject: Subject) -> None:
     if not subject.spec.reads_shear:
         skip("its spec names no kind of channel that reads shear")
     plain, felt = _read(subject, _state(subject, GENTLE_N)), False
-    of_axis = {axis: [column for column, one in enumerate(observed(subject)) if axis in axes_named(one.name)]
-               for axis in "xy"}  # fmt: skip
-    newtons = all(one.unit == "N" for one in observed(subject))
+    every = observed(subject)
+    of_axis = {axis: [column for column, one in enumerate(every) if axis in axes_named(one.name)] for axis in "xy"}
+    newtons = all(one.unit == "N" for one in every)
     moved: dict[str, dict[str, float]] = {}
     for axis, (x, s) in {"x": (SHEAR, 0.0), "y": (0.0, SHEAR)}.items():
         there, back = (_read(subject, _state(subject, GENTLE_N, None, one)) - plain for one in ((x, s), (-x, -s)))
@@ -328,7 +275,7 @@ def shear_turns_with_its_direction(subject: Subject) -> None:
         felt |= bool(there[most] or back[most])
         if there[most] * back[most] > 0:
             text = f"dragged along {axis} it changes by {there[most]:+.3g}, dragged back by {back[most]:+.3g}"
-            fail(f"channel {observed(subject)[most].name}", text)
+            fail(f"channel {every[most].name}", text)
         moved[axis] = {one: float(np.abs(there[columns]).sum()) for one, columns in of_axis.items()}
         if newtons and there[of_axis[axis]].sum() < 0:
             fail("transducer", f"dragged along {axis}, its {axis} channels fall: is a sign turned?")

@@ -28,7 +28,7 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, FloatArray, IntArray, Quality, StreamData
+from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
@@ -37,47 +37,24 @@ from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulator import Senses
 from tactbench.devices.rig_devices import emulated_device, open_driver
 from tactbench.devices.row_driver import RowDriver
-from tactbench.links.link import Clock, Link
+from tactbench.links.link import Clock
 
-READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005
-"""How long a driver is read, how long one read waits, and how long a read takes that does not wait."""
-RATED_S, LATE = 3.0, 0.05
-"""How long it is read where rate and noise are looked at; and by which share its times may span more or less."""
-BEFORE_S = 2.0
-"""What the host's clock says when a driver is made: frames wait before the start."""
-WRAPS, BEFORE_WRAP, WRAP_ROWS = (2**8, 2**16, 2**32), 10, 600
-"""Where a device's counter may wrap; how many samples before that it is set; and rows in which one of 8 bits wraps
-twice, for an emulator whose counter is not found."""
-WORK_S = 2.0
-"""For how long rows are read until a counter wraps [s of a processor]."""
-CLOCK_WRAPS_S = (2**16 * 1e-3, 2**32 * 1e-6)
-"""When a device's clock wraps: of 16 bits in milliseconds, and of 32 in microseconds."""
-CLOCK_SHARE, CLOCK_STEP_S = 0.05, 0.5
-"""By which a device's clock may be faster or slower than the host's, and step against it (assumed: rows of a second
-may come together)."""
-STEP, LAG_ROWS, LAG_S = (0.25, 0.75), 3, 0.02
-"""Shares of the middle of a channel's range between which readings step, and how late they may follow, beside the
-link's delay and a batch of rows: by so many rows and seconds (assumed: a batch of a USB adapter is 16 ms)."""
-SLEEP_S, TRIES = 0.02, 8
-"""What `read(0)` may take by the wall clock where a processor has less to do, in the quickest of some tries."""
-GONE_AT_S = 10.0
-"""When the line is unplugged, and how long that is waited for."""
-MOST_STILL = 1000
-"""Reads that may come back at one moment: of a device that sends a thousand samples at once."""
-LEVELS = 8
-"""Readings by which channels are told apart, evenly over the middle of their range: more channels take several rounds,
-so that the tolerance follows the spacing however many there are."""
-MOVING_HZ, STALE = 997.3, 0.1
-"""How fast readings run through their range where no two rows are alike, and the share that may be by chance."""
-SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6
-"""Bytes of the pieces in which a stream comes: parts of frames, and several frames at once; for how long an adapter
-holds them back; and how far apart it hands them over."""
-DAMAGE_EVERY, DAMAGE, UNLUCKY = 16, 5, 0.1
-"""Pieces after which bytes are damaged, how many of them are lost, with one of 0xFF in their place, and the share of
-such frames that may pass."""
-LOAD_N, READ_N, OVERLOAD_N, STILL_M = 0.5, 0.02, 1e6, 1e-5
-"""Load of a force channel, a step of its converter and its noise, more than any sensor bears, and by how much the
-position of a motor at rest may change (assumed: an increment of its drive, twice)."""
+# What is assumed has no source but what devices are known to do.
+READ_S, RATED_S, WAIT_S, SHORT_S = 1.0, 3.0, 0.1, 0.005  # a driver is read; for its rate; one read waits; does not wait
+LATE = 0.05  # share by which the times of rows may span more or less than the time that passed
+BEFORE_S, GONE_AT_S = 2.0, 10.0  # an emulator has been running when its driver is made; the line is unplugged
+WRAPS, BEFORE_WRAP = (2**8, 2**16, 2**32), 10  # where counters wrap, and how many samples before that one is set
+WRAP_ROWS, WORK_S = 600, 2.0  # read where no counter is found, for so many seconds of a processor at most
+CLOCK_WRAPS_S = (2**16 * 1e-3, 2**32 * 1e-6)  # of 16 bits in milliseconds, and of 32 in microseconds
+CLOCK_SHARE, CLOCK_STEP_S = 0.05, 0.5  # by which a device's clock may differ from the host's, and step (assumed)
+STEP, LAG_ROWS, LAG_S = (0.25, 0.75), 3, 0.02  # a step in shares of the range, how late it may be seen (assumed)
+SLEEP_S, TRIES = 0.02, 8  # by the wall clock for `read(0)` where a processor has less to do, in the quickest of some
+MOST_STILL = 1000  # reads that may come back at one moment, of a device that sends many samples at once
+LEVELS, MOVING_HZ, STALE = 8, 997.3, 0.1  # readings that are told apart; how fast they move; equal rows by chance
+SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6  # bytes of pieces; held back for; handed over so far apart
+DAMAGE_EVERY, DAMAGE, UNLUCKY = 16, 5, 0.1  # damaged pieces, bytes they lose, and the share of them that may pass
+LOAD_N, READ_N, OVERLOAD_N = 0.5, 0.02, 1e6  # a load, a converter's step and noise, and more than any sensor bears
+STILL_M = 1e-5  # a motor at rest: twice an increment of its drive (assumed)
 
 
 class _Adapter:
@@ -101,8 +78,7 @@ class _Adapter:
         return due_s if due_s < self._told_s + HELD_S else HELD_S * float(np.ceil(due_s / HELD_S))
 
     def _cut(self, sent: Any, now_s: float) -> Any:
-        data = b"".join(self._change(piece) for _, piece in sent)
-        pieces: list[Any] = []
+        data, pieces = b"".join(self._change(piece) for _, piece in sent), list[Any]()
         while data:
             size = next(self._sizes)
             pieces.append((now_s + APART_S * len(pieces), data[:size]))
@@ -118,10 +94,14 @@ class Opened(NamedTuple):
     clock: Clock
     emulator: Any = None
 
-    def start(self) -> None:
-        """Start the driver."""
-        with code_of("driver.start", self.subject):
-            self.driver.start()
+    def channels(self) -> list[ChannelSpec]:
+        """Return the channels of all streams."""
+        return [channel for stream in self.driver.streams for channel in stream.channels]
+
+    def call(self, name: str, *given: Any) -> Any:
+        """Call a method of the driver; what it raises is a failure that names it."""
+        with code_of(f"driver.{name}", self.subject):
+            return getattr(self.driver, name)(*given)
 
     def read(self, seconds: float = READ_S) -> dict[str, StreamData]:
         """Read for some time; return what came."""
@@ -136,15 +116,8 @@ class Opened(NamedTuple):
             if still > MOST_STILL:
                 fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
             before_ns = now_ns
-            with code_of("driver.read", self.subject):
-                blocks += self.driver.read(WAIT_S)
+            blocks += self.call("read", WAIT_S)
         return blocks
-
-
-def opened_on(subject: Subject, entry: DeviceEntry, clock: Clock, link: Callable[[], Link] | None = None) -> Opened:
-    """Open a driver; see :func:`~tactbench.devices.rig_devices.open_driver`."""
-    with code_of("driver", subject):
-        return Opened(subject, open_driver(subject.descriptor, entry, clock, link), clock)
 
 
 @contextmanager
@@ -154,20 +127,8 @@ def emulated(
 ) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
     """Open the driver on its emulator, which has been running for some time, and start it.
 
-    Parameters
-    ----------
-    faults
-        Of the emulator, as a rig file names them.
-    senses
-        What the device senses; by default it is at rest.
-    change
-        What becomes of pieces on their way to the driver; byte streams then come in pieces of other sizes.
-    before_s
-        Seconds for which it has been running.
-    of_both
-        Options of driver and emulator, beside those of the emulated device.
-    options
-        Of the driver alone.
+    `faults` are the emulator's, `change` is what becomes of pieces on their way to the driver (in other sizes then),
+    `of_both` are options of driver and emulator, and `options` of the driver alone.
     """
     name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults, options=dict(of_both))
     with code_of("emulator", subject):
@@ -177,10 +138,12 @@ def emulated(
     devices = EmulatedDevices({name: device})
     devices.advance(round(before_s * 1e9))
     entry = entry.model_copy(update={"options": {**of_both, **options}})
-    opened = opened_on(subject, entry, devices.clock, devices.opener(name))._replace(emulator=device.emulator)
+    with code_of("driver", subject):
+        driver = open_driver(subject.descriptor, entry, devices.clock, devices.opener(name))
+    opened = Opened(subject, driver, devices.clock, device.emulator)
     try:
         if started:
-            opened.start()
+            opened.call("start")
         yield opened, devices
     finally:
         with suppress(Exception):
@@ -201,14 +164,13 @@ def driver_opens(subject: Subject) -> None:
         skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
     own = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.channels()
     with emulated(subject, started=False) as (opened, devices):
-        with code_of("driver.identify", subject):
-            told = dict(opened.driver.identify())
+        told = dict(opened.call("identify"))
         if not all(isinstance(one, str) for pair in told.items() for one in pair):
             fail("driver.identify", f"{told!r}, and texts by name are needed")
-        strange = [one.name for one in _channels(opened) if own and one not in own]
+        strange = [one.name for one in opened.channels() if own and one not in own]
         if strange:
             fail("driver.streams", f"the spec has no such channel as {strange[0]}")
-        opened.start()
+        opened.call("start")
         with code_of("driver.close: it must be possible to open its link again", subject):
             opened.driver.close()
             opened.driver.close()
@@ -236,7 +198,7 @@ def driver_reads(subject: Subject) -> None:
         return {one.name: _reading(one, MOVING_HZ * t_s % 1.0)[0] for one in every}
 
     with emulated(subject, senses=moving, started=False) as (opened, _):
-        every += _channels(opened)
+        every += opened.channels()
         for name, stream in look_at(opened).items():
             again = float((np.diff(stream.data, axis=0) == 0).all(axis=1).mean())
             if again > STALE and getattr(subject.descriptor, "kind", "") != "motor":
@@ -245,7 +207,7 @@ def driver_reads(subject: Subject) -> None:
 
 def look_at(opened: Opened) -> dict[str, StreamData]:
     """Start a driver, read it for a while, and return what came; fail where its times are not as they must be."""
-    opened.start()
+    opened.call("start")
     opened.read(WAIT_S)
     began_ns = opened.clock()
     found = opened.read(RATED_S)
@@ -267,16 +229,14 @@ def _clock_is_right(where: str, stream: StreamData) -> None:
     steps = np.abs(np.diff(device_s) - np.diff(host_s))
     rate = float(np.polyfit(host_s, device_s, 1)[0])
     units = [unit for factor, unit in UNITS_OF_TIME.items() if 0.5 < rate / factor < 2]
-    if units or (steps.max() <= CLOCK_STEP_S and abs(rate - 1) > CLOCK_SHARE):
-        fail(where, f"in {units[0]}?" if units else f"it counts {rate:.4g} s in a second of the host's clock")
-    if steps.max() > CLOCK_STEP_S:
-        most = int(np.argmax(steps))
+    most = int(np.argmax(steps))
+    if units:
+        fail(where, f"in {units[0]}?")
+    if steps[most] > CLOCK_STEP_S:
         text = f"it goes on by {device_s[most + 1] - device_s[most]:.4g} s in {host_s[most + 1] - host_s[most]:.4g} s"
         fail(where, f"{text}: is it counted on over its wraps?")
-
-
-def _channels(opened: Opened) -> list[ChannelSpec]:
-    return [channel for stream in opened.driver.streams for channel in stream.channels]
+    if abs(rate - 1) > CLOCK_SHARE:
+        fail(where, f"it counts {rate:.4g} s in a second of the host's clock")
 
 
 def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
@@ -295,38 +255,35 @@ def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
 
 @check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
-    """Swapped channels, bytes in the wrong order, a lost sign or gram-force give plausible readings of something else.
+    """Swapped channels or bytes, a lost sign or gram-force give plausible readings of something else.
 
     Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
     """
     if getattr(subject.descriptor, "kind", "") == "motor":
         skip("what a motor's position is, its rig decides")
-    with emulated(subject, started=False) as (opened, _):
-        every = _channels(opened)
     place, sensed = 1, dict[str, float]()
-    while place == 1 or place < len(every):
-        meant = {one.name: _reading(one, number // place % LEVELS / (LEVELS - 1)) for number, one in enumerate(every)}
-        sensed.clear()
-        with emulated(subject, senses=lambda t_s, now=sensed: now) as (opened, _):  # type: ignore[misc]
+    with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
+        every = opened.channels()
+        while place == 1 or place < len(every):
+            levels = [number // place % LEVELS / (LEVELS - 1) for number in range(len(every))]
+            meant = {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
             sensed |= {name: value for name, (value, _) in meant.items()}
-            opened.driver.read(WAIT_S)
-            found = opened.read()
-        for name, stream in found.items():
-            for column, channel in enumerate(stream.spec.channels):
-                value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
-                expected, near = meant[channel.name]
-                if abs(value - expected) <= near:
-                    continue
-                others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
-                if others:
-                    guess = f", which is what {others[0]} senses"
-                elif abs(value + expected) <= near:
-                    guess = ": is its sign turned?"
-                else:
-                    guess = likely(value / expected) if channel.unit == "N" else ""
-                text = f"{value:.4g} where {expected:.4g} {channel.unit} are sensed{guess}"
-                fail(f"driver.read: {name}.{channel.name}", text)
-        place *= LEVELS
+            opened.read(WAIT_S)
+            for name, stream in opened.read().items():
+                for column, channel in enumerate(stream.spec.channels):
+                    value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
+                    expected, near = meant[channel.name]
+                    if abs(value - expected) <= near:
+                        continue
+                    others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
+                    guess = f", which is what {others[0]} senses" if others else ""
+                    if not others and abs(value + expected) <= near:
+                        guess = ": is its sign turned?"
+                    elif not others and channel.unit == "N":
+                        guess = likely(value / expected)
+                    text = f"{value:.4g} where {expected:.4g} {channel.unit} are sensed{guess}"
+                    fail(f"driver.read: {name}.{channel.name}", text)
+            place *= LEVELS
 
 
 @check("sensor", "device", needs="driver-reads")
@@ -337,31 +294,28 @@ def driver_decodes_the_manual(subject: Subject) -> None:
     """
     frame = subject.descriptor.manual_frame
     if frame is None:
-        skip(
-            "manual_frame holds no frame of the maker's manual: what driver and emulator have in common is not checked"
-        )
+        skip("manual_frame is empty: what driver and emulator have in common is not compared with the maker's manual")
     if subject.descriptor.emulated_link != "bytes":
         skip("its link is no stream of bytes")
-    data, from_manual = bytes.fromhex(frame.data), False
-    with emulated(subject, change=lambda piece: data if from_manual else piece) as (opened, _):
+    data = [b""]
+    with emulated(subject, change=lambda piece: data[0] or piece) as (opened, _):
         opened.read()
-        from_manual = True
+        data[0] = bytes.fromhex(frame.data)
         opened.read(WAIT_S)
-        found = {channel.name: good(stream)[-1:, column] for stream in opened.read().values()
+        found = {channel.name: good(stream)[-1, column] for stream in opened.read().values() if len(stream.data)
                  for column, channel in enumerate(stream.spec.channels)}  # fmt: skip
     for name, meant in frame.readings.items():
-        read = found.get(name, np.empty(0))
-        if not len(read) or not math.isclose(read[0], meant, rel_tol=1e-6, abs_tol=1e-9):
-            text = f"{read[0]:g}" if len(read) else "no row"
-            fail(f"manual_frame.readings[{name}]", f"{meant:g} by the manual, and the driver gives {text}")
+        read = found.get(name, math.nan)
+        if not math.isclose(read, meant, rel_tol=1e-6, abs_tol=1e-9):
+            fail(f"manual_frame.readings[{name}]", f"{meant:g} by the manual, and the driver gives {read:g}")
 
 
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_takes_any_pieces(subject: Subject) -> None:
     """A serial port hands over half a frame or several at once, and cables lose bytes, which must not become a reading.
 
-    Keep what is left of a frame for the next read, and take all frames that are whole. Look for a frame's length, end
-    or checksum, leave out what is damaged, find the next beginning, and count it in `counts` or mark it as SUSPECT.
+    Keep what is left of a frame for the next read, and take all whole frames. Look for a frame's length, end or
+    checksum, leave out what is damaged and find the next beginning; count it in `counts` or mark it as SUSPECT.
     """
     if subject.descriptor.emulated_link != "bytes":
         skip("its link hands over whole frames")
@@ -376,26 +330,23 @@ def driver_takes_any_pieces(subject: Subject) -> None:
         sound = opened.read()
     with emulated(subject, change=damaged) as (opened, _):
         cut = opened.read()
-        for name, stream in sound.items():
-            came, whole = len(cut[name].data), len(stream.data)
-            if came < (0.9 - HELD_S / READ_S) * whole - 2:
-                text = f"{came} rows of {name} in {READ_S:g} s where frames come in pieces or several at once"
-                fail("driver.read", f"{text}, {whole} where each comes whole")
         lost, before = DAMAGE, dict(opened.driver.counts)
         found = opened.read(2 * READ_S)
         damages = next(seen) // DAMAGE_EVERY
         noticed = opened.driver.counts != before or not damages
-    for name, stream in found.items():
-        if not len(stream.data):
-            fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
-        low, high = sound[name].data.min(axis=0), sound[name].data.max(axis=0)
+    for name, stream in sound.items():
+        where, came, whole, values = f"driver.read: {name}", len(cut[name].data), len(stream.data), good(found[name])
+        if came < (0.9 - HELD_S / READ_S) * whole - 2:
+            fail(where, f"{came} rows where frames come in pieces or several at once, {whole} where each comes whole")
+        if not len(values):
+            fail(where, "no row comes where frames are damaged now and then")
+        low, high = stream.data.min(axis=0), stream.data.max(axis=0)
         near = 3 * (high - low + 1) + 0.05 * np.abs(high)
-        values = good(stream)
         wrong = values[((values < low - near) | (values > high + near)).any(axis=1)]
         # A checksum of 8 bits fits a damaged frame once in 256 times.
         if len(wrong) > max(1, UNLUCKY * damages):
             text = f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong.flat[np.abs(wrong).argmax()]:g}"
-            fail(f"driver.read: {name}", text)
+            fail(where, text)
         noticed |= bool(np.isnan(values).any())
     if not noticed:
         fail("driver.counts", "frames were damaged, and neither counted nor marked")
@@ -403,59 +354,47 @@ def driver_takes_any_pieces(subject: Subject) -> None:
 
 def _counters(emulator: Any) -> dict[str, int]:
     """Return what an emulator counts, by attribute: whole numbers, and the next of ``itertools.count``."""
-    own = {name: one for name, one in vars(emulator).items() if name != "_rows"}  # the base class's clock
-    whole = {name: one for name, one in own.items() if type(one) is int}
-    return whole | {name: int(repr(one)[6:-1]) for name, one in own.items() if re.fullmatch(r"count\(\d+\)", repr(one))}
+    texts = {name: re.fullmatch(r"(?:count\()?(\d+)\)?", repr(one)) for name, one in vars(emulator).items()}
+    return {name: int(found[1]) for name, found in texts.items() if found and name != "_rows"}  # the base class's clock
 
 
 @check("sensor", "device", needs="driver-reads")
 def driver_counts_on(subject: Subject) -> None:
     """Counters and clocks wrap; what begins again with them looks like rows that come late, and is left out.
 
-    Count on over the wraps: tactbench.plugin.devices.Unwrap(bits). An emulator that keeps its count as a whole number
-    or an itertools.count is set to where one of 8, 16 or 32 bits wraps.
+    Count on over the wraps of 8, 16 or 32 bits: tactbench.plugin.devices.Unwrap(bits).
     """
-    last: dict[str, IntArray] = {}
 
     def counted(opened: Opened, seconds: float) -> int:
         """Read, fail where numbers do not go on by one, and return how many rows came."""
         found = opened.read(seconds)
         for name, stream in found.items():
-            if stream.sequence is None:
-                continue
-            numbers = np.concatenate([last.get(name, stream.sequence[:0]), stream.sequence])
-            for a, b in itertools.pairwise(numbers.tolist()):
+            for a, b in itertools.pairwise(() if stream.sequence is None else stream.sequence.tolist()):
                 if b != a + 1:
                     fail(f"driver.read: {name}.sequence", f"{a} is followed by {b}, and no row was lost")
-            last[name] = numbers[-1:]
         return max(len(stream.data) for stream in found.values())
 
-    with emulated(subject) as (opened, _):
-        first = opened.read()
-        clocked = any(stream.device_ns is not None for stream in first.values())
-        slowest = min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
-        some_s = 4 * BEFORE_WRAP / slowest
-        if any(stream.sequence is not None for stream in first.values()):
-            before = _counters(opened.emulator)
-            rows, now = counted(opened, READ_S + some_s), _counters(opened.emulator)
-            moved = [name for name, value in now.items() if abs(value - before.get(name, value) - rows) <= 0.1 * rows]
-            for wrap, name in itertools.product(WRAPS, moved):
-                held = vars(opened.emulator)[name]
-                last.clear()
-                value = type(held)(wrap - BEFORE_WRAP)
-                vars(opened.emulator)[name] = value
-                with suppress(struct.error, OverflowError):  # one of fewer bits
-                    opened.read(1 / slowest)
-                    counted(opened, some_s)
-            until_s = time.process_time() + WORK_S
-            while not moved and rows < WRAP_ROWS and time.process_time() < until_s:
-                rows += counted(opened, READ_S)
-            if not moved and rows < WRAP_ROWS:
-                skip(f"its counter did not wrap within {rows} rows, {WORK_S:g} s of a processor")
-        elif not clocked:
-            skip("its device numbers no samples, and has no clock")
     with emulated(subject, started=False) as (opened, _):
         quiet = not math.isfinite(_due_s(opened.emulator))
+        opened.call("start")
+        first, before = opened.read().values(), _counters(opened.emulator)
+        clocked, numbered = (any(getattr(one, name) is not None for one in first) for name in ("device_ns", "sequence"))
+        if not clocked and not numbered:
+            skip("its device numbers no samples, and has no clock")
+        slowest = min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
+        some_s, until_s = 4 * BEFORE_WRAP / slowest, time.process_time() + WORK_S
+        rows, now = counted(opened, READ_S + some_s), _counters(opened.emulator)
+        moved = [one for one, value in now.items() if abs(value - before.get(one, value) - rows) <= 0.1 * rows]
+        for wrap, name in itertools.product(WRAPS, moved if numbered else ()):
+            held = vars(opened.emulator)
+            held[name] = type(held[name])(wrap - BEFORE_WRAP)
+            with suppress(struct.error, OverflowError):  # one of fewer bits
+                opened.read(1 / slowest)
+                counted(opened, some_s)
+        while numbered and not moved and rows < WRAP_ROWS:
+            if time.process_time() > until_s:
+                skip(f"its counter did not wrap within {rows} rows, {WORK_S:g} s of a processor")
+            rows += counted(opened, READ_S)
     for wraps_s in CLOCK_WRAPS_S if clocked and quiet else ():
         with emulated(subject, before_s=wraps_s - 1.0) as (opened, _):
             for name, stream in opened.read(2.0).items():
@@ -470,24 +409,21 @@ def driver_waits_and_stops(subject: Subject) -> None:
     """
     with emulated(subject, started=False) as (opened, devices):
         quiet = not math.isfinite(_due_s(opened.emulator))
-        opened.start()
+        opened.call("start")
         for wait_s in (WAIT_S, WAIT_S, 0.0):
             began_ns = opened.clock()
-            with code_of("driver.read", subject):
-                opened.driver.read(wait_s)
+            opened.call("read", wait_s)
             took_s = (opened.clock() - began_ns) * 1e-9
             if took_s > wait_s + SHORT_S:
                 fail("driver.read", f"read({wait_s:g}) took {took_s:.2g} s")
-        spent = []
+        spent = [(time.perf_counter(), time.thread_time())]
         for _ in range(TRIES):
-            wall_s, busy_s = time.perf_counter(), time.thread_time()
             opened.driver.read(0.0)
-            spent.append((time.perf_counter() - wall_s, time.thread_time() - busy_s))
-        wall_s, busy_s = min(spent)
+            spent.append((time.perf_counter(), time.thread_time()))
+        wall_s, busy_s = min((b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(spent))
         if wall_s > SLEEP_S and busy_s < wall_s / 2:
             fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s")
-        with code_of("driver.stop", subject):
-            opened.driver.stop()
+        opened.call("stop")
         devices.advance(opened.clock() + round(1e9 * WAIT_S))
         told = getattr(type(opened.driver), "quiet", None)
         # Of some devices no source says how they are stopped, and others answer whenever they are asked.
@@ -513,44 +449,30 @@ def driver_follows_a_step(subject: Subject) -> None:
     if getattr(subject.descriptor, "kind", "") == "motor":
         skip("what a motor's position is, its rig decides")
     with emulated(subject, started=False) as (opened, _):
-        every, rates = _channels(opened), [stream.rate_hz or 100.0 for stream in opened.driver.streams]
-    levels = [{one.name: _reading(one, share)[0] for one in every} for share in STEP]
-    stated = getattr(subject.spec, "link_delay", None)
-    delay_s, piece_ns = LAG_S if stated is None else LAG_S + stated.to("s"), round(1e9 * max(0.01, 4 / min(rates)))
-    times_s: list[float] = []
-
-    def senses(t_s: float) -> dict[str, float]:
-        return levels[sum(t_s >= one for one in times_s) % 2]
-
-    def shares(stream: StreamData) -> FloatArray:
-        """Return how far each whole row is from the one level to the other."""
-        low, high = (np.array([level[one.name] for one in stream.spec.channels]) for level in levels)
-        found: FloatArray = ((good(stream) - low) / (high - low)).mean(axis=1)
-        return found[np.isfinite(found)]
-
-    with emulated(subject, senses=senses, started=False) as (opened, devices):
-        opened.start()
-        times_s.append(1e-9 * opened.clock() + READ_S)
-        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / min(rates))
-        for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
-            found = shares(stream)
-            low = np.flatnonzero(found < STEP[1])
-            if stream.t_ns is None or len(low) in (0, len(found)):  # a stream that gives no steady level
-                continue
-            if abs(found[0]) > STEP[0]:
-                fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
-            late_s = float(stream.t_ns[min(int(low[-1]) + 1, len(found) - 1)]) * 1e-9 - times_s[0]
-            batch = max(len(one.data) for one in blocks if one.stream == name)
-            if late_s > delay_s + (LAG_ROWS + batch) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found):
-                fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
-        times_s += [1e-9 * (opened.clock() + number * piece_ns) for number in (1, 3, 5)]
-        for number in range(3):
-            devices.advance(opened.clock() + 2 * piece_ns)
-            with code_of("driver.read", subject):
-                blocks = opened.driver.read(WAIT_S)
-            for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
-                if (np.diff(shares(stream)) * (1 - 2 * (number % 2)) > STEP[0]).any():
-                    fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
+        every, slowest = opened.channels(), min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
+    low, high = ({one.name: _reading(one, share)[0] for one in every} for share in STEP)
+    stated, at_s = getattr(subject.spec, "link_delay", None), [math.inf]
+    with emulated(subject, senses=lambda t_s: high if t_s >= at_s[0] else low) as (opened, devices):
+        blocks, row_s = opened.blocks(READ_S + 2 / slowest), max(0.01, 1 / slowest)
+        at_s[0] = 1e-9 * opened.clock() + 4 * row_s
+        devices.advance(opened.clock() + round(8e9 * row_s))  # the step lies in the middle of a block
+        blocks += opened.blocks(READ_S + 2 * LAG_ROWS / slowest)
+    for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
+        ends = [np.array([level[one.name] for one in stream.spec.channels]) for level in (low, high)]
+        found = ((good(stream) - ends[0]) / (ends[1] - ends[0])).mean(axis=1)
+        whole = np.isfinite(found)
+        found, before = found[whole], np.flatnonzero(found[whole] < STEP[1])
+        if stream.t_ns is None or len(before) in (0, len(found)):  # a stream that gives no steady level
+            continue
+        if abs(found[0]) > STEP[0]:
+            fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
+        if (np.diff(found) < -STEP[0]).any():
+            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
+        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - at_s[0]
+        batch = max(len(one.data) for one in blocks if one.stream == name)
+        rows_s = (LAG_ROWS + batch) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found)
+        if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
+            fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
 
 
 @check("sensor", "device", needs="driver-reads")
@@ -564,22 +486,20 @@ def driver_reports_what_happens(subject: Subject) -> None:
         for _ in range(2):
             began_ns = devices.clock() + round(BEFORE_S * 1e9)
             devices.advance(began_ns)
-            opened.start()
+            opened.call("start")
             for name, stream in opened.read().items():
                 early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
                 if early_s > 0:
                     fail("driver.start", f"a row of {name} is from {early_s:.2g} s before it was started")
             opened.driver.stop()
-        opened.start()
+        opened.call("start")
         try:
             opened.read(GONE_AT_S)
         except CheckFailed as failure:
-            error = failure.__cause__
-            if isinstance(error, LinkError | RigError):
+            if isinstance(failure.__cause__, LinkError | RigError):
                 return
-            if error is not None:
-                what = type(error).__name__
-                fail("driver.read", f"{what} instead of LinkUnplugged once the line is gone: {error}")
+            if failure.__cause__ is not None:
+                raise
     fail("driver.read", "it goes on as if nothing had come once its line is gone")
 
 
@@ -591,32 +511,37 @@ def device_is_fit_for_a_rig(subject: Subject) -> None:
     only where the device takes its reading as zero; mark its range's end as SATURATED. Leave a motor where it is, and
     without power, in the driver's making, identify(), start() and read().
     """
-    device, sensed, taken = subject.descriptor.kind, dict[str, float](), False
+    device, sensed = subject.descriptor.kind, dict[str, float]()
     kind, unit = ("force", "N") if device == "force" else ("position", "m")
     if device not in ("force", "motor"):
         skip(f"it is a {device} device")
     with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
-        own = [one for one in _channels(opened) if one.kind == kind]
+        own = [one for one in opened.channels() if one.kind == kind]
         for channel in own:
             if channel.unit != unit:
                 fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
         if not own:
             fail("driver.streams", f"none of its channels is of kind {kind}")
-        for force_n in (LOAD_N, LOAD_N, OVERLOAD_N):
-            sensed |= {channel.name: force_n for channel in own if kind == "force"}
+
+        def read(force_n: float) -> list[tuple[str, Any, Any]]:
+            """Return readings and marks of each of its own channels under a load."""
+            sensed.update({one.name: force_n for one in own if kind == "force"})
             opened.read()
-            for name, stream in opened.read().items():
-                columns = [one in own for one in stream.spec.channels]
-                values = good(stream)[:, columns]
-                there = values[np.isfinite(values).all(axis=1)]
-                moved = np.ptp(there, axis=0).max(initial=0.0) if len(there) else 0.0
-                if kind == "position" and moved > STILL_M:
-                    fail(f"driver.read: {name}", f"it changes by {1e3 * moved:.3g} mm, and nobody has moved it")
-                left_n = np.abs(np.nanmedian(values, axis=0)).max(initial=0.0) if taken else 0.0
-                if force_n == LOAD_N and left_n > 2 * READ_N:
-                    fail("driver.tare", f"it says that a zero is taken, and {left_n:.4g} N are read")
-                marked = marks_of(stream)[:, columns] & (Quality.SATURATED | BAD)
-                if force_n == OVERLOAD_N and kind == "force" and not marked.all():
-                    fail(f"driver.read: {name}", f"it is not marked SATURATED under {OVERLOAD_N:g} N")
-            with code_of("driver.tare", subject):
-                taken = taken or (kind == "force" and opened.driver.tare())
+            return [(f"driver.read: {name}.{one.name}", good(stream)[:, column], marks_of(stream)[:, column])
+                    for name, stream in opened.read().items()
+                    for column, one in enumerate(stream.spec.channels) if one in own]  # fmt: skip
+
+        for where, values, _ in read(LOAD_N):
+            there = values[np.isfinite(values)]  # none before an axis is homed
+            moved_m = float(np.ptp(there)) if len(there) else 0.0
+            if kind == "position" and moved_m > STILL_M:
+                fail(where, f"it changes by {1e3 * moved_m:.3g} mm, and nobody has moved it")
+        if kind == "position":
+            return
+        taken = opened.call("tare")
+        for _, values, _ in read(LOAD_N) if taken else ():
+            if abs(left_n := np.nanmedian(values)) > 2 * READ_N:
+                fail("driver.tare", f"it says that a zero is taken, and {left_n:.4g} N are read")
+        for where, _, marks in read(OVERLOAD_N):
+            if not (marks & (Quality.SATURATED | BAD)).all():
+                fail(where, f"it is not marked SATURATED under {OVERLOAD_N:g} N")

@@ -17,21 +17,16 @@ from tactbench.core.conformance.press import REAL_N, WHY, slow_ramp, tiny_scene
 from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.rigs import load_rig_file, rig_context
-from tactbench.core.samples import FloatArray, StreamData
-from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.samples import FloatArray
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import Nuisances
-from tactbench.devices.conformance.driver import look_at, opened_on
+from tactbench.devices.conformance.driver import Opened, look_at
+from tactbench.devices.rig_devices import open_driver
 
-SECONDS, HOLD_S = 8.0, 1.0
-"""A motor that lifts off for the unloaded hold takes some of them to be back on the skin."""
-END, PEAK = 16, 99
-"""The force at the end is the mean of the last sixteenth of its rows, the largest their 99th percentile: of 8 s those
-are half a second, and what is longer than a tenth: noise is no overshoot."""
-LARGEST = 1.5
-"""Times `REAL_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
-NOISY = 3.0
-"""By which factor a real unit's noise may differ from the stated one (assumed: units and rooms differ by two)."""
+SECONDS, HOLD_S = 8.0, 1.0  # a motor that lifts off for the unloaded hold takes some of them to be back on the skin
+END, PEAK = 16, 99  # the end is the mean of the last sixteenth of the rows, the largest a percentile: noise is no peak
+LARGEST = 1.5  # times `REAL_N` at most (assumed: a loop that overshoots by half is badly tuned)
+NOISY = 3.0  # factor by which a unit's noise may differ from the stated one (assumed: units and rooms differ by two)
 
 
 def _file(subject: Subject) -> RigFile:
@@ -55,42 +50,35 @@ def real_device_answers(subject: Subject) -> None:
     entry = named[subject.name]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
-    opened = opened_on(subject, entry, time.monotonic_ns)
+    with code_of("driver", subject):
+        driver = open_driver(subject.descriptor, entry, time.monotonic_ns)
+    opened = Opened(subject, driver, time.monotonic_ns)
     try:
-        with code_of("driver.identify", subject):
-            opened.driver.identify()
-        for stream in look_at(opened).values():
-            _noise_is_as_stated(subject, stream)
+        opened.call("identify")
+        found = look_at(opened)
     finally:
         with suppress(TactbenchError):
-            opened.driver.close()
-
-
-def _noise_is_as_stated(subject: Subject, stream: StreamData) -> None:
-    """Fail where a channel stands still that has noise, or has much more or less of it than its spec states."""
-    for column, channel in enumerate(stream.spec.channels):
-        where, sd = f"driver.read: {stream.spec.name}.{channel.name}", float(np.nanstd(good(stream)[:, column]))
-        stated = getattr(subject.spec, "nuisances", {}).get(channel.kind, Nuisances())
-        hidden, seen = stated.hidden(), channel.kind == "force" or stated.white.value > stated.step.value / 2
-        if (seen and sd <= hidden / NOISY) or (hidden and sd > NOISY * hidden):
-            text = f"its noise at rest is {sd:.3g} {channel.unit} (sd), {hidden:.3g} are stated in spec.nuisances"
-            fail(where, text if sd else f"it is constant at rest: is it connected? {hidden:.3g} (sd) are stated")
+            driver.close()
+    for name, stream in found.items():
+        for column, channel in enumerate(stream.spec.channels):
+            stated, sd = (
+                getattr(subject.spec, "nuisances", {}).get(channel.kind, Nuisances()),
+                float(np.nanstd(good(stream)[:, column])),
+            )
+            hidden, seen = stated.hidden(), channel.kind == "force" or stated.white.value > stated.step.value / 2
+            if (seen and sd <= hidden / NOISY) or (hidden and sd > NOISY * hidden):
+                text = (
+                    f"its noise at rest is {sd:.3g} {channel.unit} (sd)"
+                    if sd
+                    else "it is constant at rest: is it connected?"
+                )
+                fail(f"driver.read: {name}.{channel.name}", f"{text}; spec.nuisances states {hidden:.3g}")
 
 
 def _zeros(drawn: Mapping[str, Any]) -> list[float]:
     """Return what was taken off the reference's channels as their zero, as PressingForce.about says it."""
     texts = [str(text) for name, text in sorted(drawn.items()) if name.startswith("zero of ")]
     return [float(one) for text in texts for one in text.split(",")]
-
-
-def _built(subject: Subject) -> tuple[Any, SensorDescriptor, Any]:
-    """Return the rig, the first sensor of its file, and a slow press."""
-    file = _file(subject)
-    if file.rig != subject.name:
-        skip(f"the rig file is for the rig {file.rig}")
-    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
-    scene = tiny_scene(profile=slow_ramp(REAL_N, SECONDS, HOLD_S))
-    return subject.code("where")(context), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
 @check("rig", mode="invasive", needs="code-names-resolve")
@@ -101,10 +89,14 @@ def real_rig_presses(subject: Subject) -> None:
     then at the gains of the force loop. Retreat at the end of each scene, also of one that failed; let `stop` retreat,
     wait for its end, and return "" or what is to be done by hand.
     """
-    first: list[Any] = []
+    file, first = _file(subject), list[Any]()
+    if file.rig != subject.name:
+        skip(f"the rig file is for the rig {file.rig}")
+    sensor = subject.registry.sensors[next(iter(file.sensors))]
+    scene = tiny_scene(profile=slow_ramp(REAL_N, SECONDS, HOLD_S))
     with code_of("where", subject):
-        rig, sensor, scene = _built(subject)
-        made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=_file(subject), opened=first.append)
+        rig = subject.code("where")(rig_context(subject.registry, rig_file=file, operator=subject.operator))
+        made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=file, opened=first.append)
     if not hasattr(first[0], "stop"):
         return  # nothing in it moves by itself: a hand presses
     _, force_n = pressing_force(made.came, made.meta.reference)

@@ -169,7 +169,7 @@ SILENT = {
 """Which of them, counted from 1, `check` does not find, and why."""
 FOUND_BY = {
     10: "driver-follows-a-step",
-    22: "forces-are-the-forces",
+    22: "it-answers-to-a-press",
     24: "skin-yields-as-skins-do",
     41: "scenes-can-be-pressed",
     88: "readings-are-as-stated",

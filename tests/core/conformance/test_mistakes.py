@@ -67,7 +67,7 @@ MISTAKES = [
     ("pad", "return 100.0", "state.pressure_mpa[:] *= 2; return 100.0", "transducer-has-no-memory", "pressure_mpa"),
     ("pad", "return 100.0", "return 100.0 + np.random.rand(4)", "transducer-has-no-memory", "the same state"),
     ("pad", "assumed(400,", "assumed(0.4,", "it-answers-to-a-press", "no more than noise and step"),
-    ("pad", "assumed(400,", "assumed(4e6,", "limits-are-kept", "stand at a limit in a press"),
+    ("pad", "assumed(400,", "assumed(4e6,", "press-is-recorded", "stand at a limit in a press"),
     ("pad", "state.pressure_mpa, 2)", "state.pressure_mpa, 2) / (1 + 3 * state.force_n**2)",
      "sign-is-as-stated", "under 2 N"),
     ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns / 1e9)", "driver-reads", "it is in seconds"),
