@@ -83,7 +83,7 @@ with LiveView(Scene(name="fed", profile=RAMP), "pad") as view:
 
 def test_a_prompt_has_the_terminal(tmp_path):
     with on_terminal(["-c", ASKS], cwd=tmp_path) as terminal:
-        terminal.read_until("4 taxels")
+        terminal.read_until("0 rows")
         os.write(terminal.ours, b"\n")
         asked = terminal.read_until("Place the cap.")
         assert FIRST_SCREEN in asked

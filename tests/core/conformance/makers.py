@@ -37,7 +37,7 @@ TARGET = 'LabelTarget(name="offset_mm", unit="mm")'
 # Family, package, what its author should have written, and what was written.
 MISTAKES: list[tuple[str, str, str | tuple[str, ...], str | tuple[str, ...]]] = [
     # What a driver does around a read.
-    ("driver", "pad", BLOCKS, "for block in (__import__('time').sleep(0.05), super().read(timeout_s))[1]]"),
+    ("driver", "pad", BLOCKS, "for block in (__import__('time').sleep(0.0 if timeout_s else 0.05), super().read(timeout_s))[1]]"),
     ("driver", "pad", "        self._numbers = []\n", "        self._numbers = []\n        until = self.link.timer() + 0.7\n"
      "        while timeout_s and self.link.timer() < until: self._numbers.clear(); self.link.receive_all(0.02)\n"),
     ("driver", "pad", 'self.link.write(b"stop")', "pass"),
