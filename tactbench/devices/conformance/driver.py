@@ -451,28 +451,39 @@ def driver_follows_a_step(subject: Subject) -> None:
     with emulated(subject, started=False) as (opened, _):
         every, slowest = opened.channels(), min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
     low, high = ({one.name: _reading(one, share)[0] for one in every} for share in STEP)
-    stated, at_s = getattr(subject.spec, "link_delay", None), [math.inf]
-    with emulated(subject, senses=lambda t_s: high if t_s >= at_s[0] else low) as (opened, devices):
-        blocks, row_s = opened.blocks(READ_S + 2 / slowest), max(0.01, 1 / slowest)
-        at_s[0] = 1e-9 * opened.clock() + 4 * row_s
-        devices.advance(opened.clock() + round(8e9 * row_s))  # the step lies in the middle of a block
-        blocks += opened.blocks(READ_S + 2 * LAG_ROWS / slowest)
-    for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
+    stated, row_s, steps_s = getattr(subject.spec, "link_delay", None), max(0.01, 1 / slowest), list[float]()
+
+    def shares(stream: StreamData) -> FloatArray:
+        """Return (n,) how far each row is from the low level to the high one; NaN where a channel has no reading."""
         ends = [np.array([level[one.name] for one in stream.spec.channels]) for level in (low, high)]
-        found = ((good(stream) - ends[0]) / (ends[1] - ends[0])).mean(axis=1)
+        return np.asarray(((good(stream) - ends[0]) / (ends[1] - ends[0])).mean(axis=1))
+
+    def senses(t_s: float) -> dict[str, float]:
+        return high if sum(t_s >= one for one in steps_s) == 1 else low
+
+    with emulated(subject, senses=senses) as (opened, devices):
+        steps_s.append(1e-9 * opened.clock() + READ_S)
+        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / slowest)
+        steps_s.append(1e-9 * opened.clock() + 4 * row_s)
+        devices.advance(opened.clock() + round(8e9 * row_s))  # this step lies in the middle of a block
+        after = opened.blocks(READ_S)
+    for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
+        found = shares(stream)
         whole = np.isfinite(found)
         found, before = found[whole], np.flatnonzero(found[whole] < STEP[1])
         if stream.t_ns is None or len(before) in (0, len(found)):  # a stream that gives no steady level
             continue
         if abs(found[0]) > STEP[0]:
             fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
-        if (np.diff(found) < -STEP[0]).any():
-            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
-        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - at_s[0]
+        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - steps_s[0]
         batch = max(len(one.data) for one in blocks if one.stream == name)
         rows_s = (LAG_ROWS + batch) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found)
         if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
             fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
+    for name, stream in joined("driver.read", opened.driver.streams, after).items():
+        found = shares(stream)
+        if (np.diff(found[np.isfinite(found)]) > STEP[0]).any():
+            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
 
 
 @check("sensor", "device", needs="driver-reads")
