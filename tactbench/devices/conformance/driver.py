@@ -28,7 +28,7 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, Quality, StreamData
+from tactbench.core.samples import Block, FloatArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
