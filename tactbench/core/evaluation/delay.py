@@ -55,7 +55,8 @@ def stated_delay_ms(
     -------
     dict, tuple
         ``sampling``: one interval of the slowest stream used, at the sensor's own rate: a change just after a sample
-        waits that long for the next one. Where the sensor states no rate, the interval of the recordings. Of frames the
+        waits that long for the next one. Where the sensor states no rate, or its clock a slower one, the interval of
+        the recordings. Of frames the
         wait for the next frame, where that is longer.
         ``link``: as the sensor's spec states it.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
@@ -98,7 +99,10 @@ def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[
             sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stated_hz
             own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz)
             own_hz = own_hz / rules.every if own_hz else sampled_hz
-            waits_ms.append(1e3 / own_hz if own_hz else None)
+            # A rig may record a sensor at a rate below its own; where none says so, a clock outweighs what is stated.
+            slower = sampled_hz and own_hz and sampled_hz < (1 - RATE_TOLERANCE) * own_hz
+            waited_hz = sampled_hz if slower and stream.name not in meta.own_rates_hz else own_hz
+            waits_ms.append(1e3 / waited_hz if waited_hz else None)
             if own_hz and sampled_hz and abs(sampled_hz - own_hz) > RATE_TOLERANCE * own_hz:
                 remarks[f"{stream.name} sampled at {sampled_hz:.4g} Hz; its own rate is {own_hz:.4g} Hz"] = None
     if (wait_ms := _largest(waits_ms)) is not None:

@@ -51,6 +51,16 @@ def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what
         assert remarks == ((f"taxels sampled at 83.33 Hz; {said}",) if said else ())
 
 
+@pytest.mark.parametrize(("stated_hz", "sampling_ms"), [(100.0, 12.0), (83.3, 12.0), (50.0, 20.0)])
+def test_a_stated_rate_that_the_clock_denies_shortens_no_delay(tmp_path, stated_hz, sampling_ms):
+    data = load_dataset(TASK, pressed(tmp_path / "a"))
+    (stream,) = sensor().streams
+    stated = sensor().model_copy(update={"streams": (stream.model_copy(update={"rate_hz": stated_hz}),)})
+    tables = [replace(one, meta=one.meta.model_copy(update={"sensor": stated})) for one in data.tables]
+    parts, _ = reading_delay_ms(replace(data, tables=tuple(tables)))
+    assert parts["sampling"] == pytest.approx(sampling_ms, rel=1e-3)  # digits of the stated rate
+
+
 def test_what_is_not_known_is_absent_and_said(tmp_path):
     data = load_dataset(TASK, pressed(tmp_path / "a"))
     parts, remarks = reading_delay_ms(data)
