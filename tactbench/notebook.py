@@ -425,9 +425,11 @@ def _over_data(
                 for work in cells_of(called, given, task, mine, **stated):
                     if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
                         of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
-                        work.how["split"] = splits.setdefault(of, work.how["split"])
-                        folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
-                        folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
+                        if of not in splits:
+                            splits[of] = work.how["split"]
+                            folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
+                            folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
+                        work.how["split"] = splits[of]
                     asked[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
     for name, rows in side_by_side(asked, out, jobs or usable_cores()).items():

@@ -14,7 +14,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from pickle import PicklingError
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,9 +39,6 @@ from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.study.progress import progress
 from tactbench.recordings import Recordings, opened_as
-
-if TYPE_CHECKING:
-    pass
 
 Row = dict[str, Any]
 
@@ -212,11 +209,12 @@ def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) 
         for name, works in asked.items():
             store = held.enter_context(Store(out / name).hold())
             store.begin(gather(installed(), engine="joblib"))
+            each = {work.paths for work in works.values()}
+            digests = {paths: {path: store.about(path)["digest"] for path in paths} for paths in each}
             for work in works.values():
                 work = work._replace(cell=replace(work.cell, timed=jobs == 1))
-                digests = {path: store.about(path)["digest"] for path in work.paths}
                 try:
-                    key, sections = keys.of_given(work.cell, work.task, work.how, digests)
+                    key, sections = keys.of_given(work.cell, work.task, work.how, digests[work.paths])
                     why = ""
                 except ValueError as error:
                     key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
