@@ -43,7 +43,6 @@ from tactbench.plugin.devices import (
     ask_operator,
     physics_of,
     read_options,
-    running,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
@@ -167,8 +166,8 @@ class ParallelManipulator(Rig):
     Parameters
     ----------
     file
-        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those of real time run
-        in a process of their own, and are real ones here.
+        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those that `tactbench
+        emulate` runs in real time are real ones here.
     operator
         Who mounts the caps; not needed where all devices are emulated.
     physics
@@ -375,6 +374,5 @@ def build(context: RigContext) -> ParallelManipulator:
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
             hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
         )
-    file = running(context.rig_file)
-    refuse(file)
-    return ParallelManipulator(file, context.operator, physics_of(file, load_registry()))
+    refuse(context.rig_file)
+    return ParallelManipulator(context.rig_file, context.operator, physics_of(context.rig_file, load_registry()))
