@@ -131,7 +131,7 @@ class RigFile(Frozen):
         if self.emulated and real:
             raise UsageError(
                 f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
-                hint="Use the rig file that `tactbench emulate --rig-file FILE` prints: it runs the emulated ones by the clock.",
+                hint="Use the rig file that `tactbench emulate --rig-file FILE` prints.",
             )
         return self
 

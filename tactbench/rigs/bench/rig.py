@@ -1,7 +1,7 @@
 """The bench as a rig: a sensor and a reference force sensor are read while somebody presses, and nothing moves.
 
-Devices that the rig file calls emulated sense what a simulated rig computes of the same scene, in virtual time. Samples
-come through their links and drivers as from real ones. Those that `tactbench emulate` runs in real time are real ones here.
+Devices that the rig file calls emulated sense what a simulated rig computes of the same scene, in virtual time; their
+links and drivers carry it as those of real ones do. What `tactbench emulate` runs in real time is a real device here.
 """
 
 from __future__ import annotations
