@@ -105,11 +105,12 @@ class EmulatedPress:
     def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
         """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
         force_n = self.force_n(position_m)
-        since_s = (t_s - self._start_s) % self._duration_s
+        last_s = self._duration_s - 1e-9  # the sample at the end of the scene is one without load
+        since_s = min((t_s - self._start_s) % self._duration_s, last_s)
         load_n = float(np.interp(since_s, *self._corners))
         noise_n = self._samples(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
-            at_s = min(self._hold_s + force_n * self._s_per_n, self._duration_s - 1e-9)
+            at_s = min(self._hold_s + force_n * self._s_per_n, last_s)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
