@@ -255,7 +255,7 @@ def test_an_increment_that_is_not_answered():
     driver.update(0.1)
     driver.move_by(100 * STEP_M)
     link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.08, delay_s=0.5)]
-    with pytest.raises(PositionerSilentError, match="LA100|M "):
+    with pytest.raises(PositionerSilentError, match=r"LA100|M "):
         finish(driver, link)
     link.emulator.faults = []
     assert not driver.moving

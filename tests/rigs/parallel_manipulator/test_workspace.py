@@ -5,8 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, forward
-from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError, check_move, margins, way, way_points
+from tactbench.rigs.parallel_manipulator.kinematics import (
+    LinearDelta,
+    PlaceRefusedError,
+    check_move,
+    forward,
+    margins,
+    way,
+    way_points,
+)
 from tests.rigs.parallel_manipulator.test_kinematics import LI, LV
 
 HOME = np.array([0.0, 0.0, -0.15])

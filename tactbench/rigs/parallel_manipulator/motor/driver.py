@@ -331,7 +331,7 @@ class FaulhaberDriver(Positioner):
                 if there == 2:  # One could be the late answer to another question.
                     return place_m
         raise PositionerError(
-            f"The motor was sent to {target_m:g} m; its last reported position after {within_s:.1f} s is {place_m:g} m.",
+            f"The motor was sent to {target_m:g} m and reports {place_m:g} m after {within_s:.1f} s.",
             hint="Stand clear, cut its supply, and see what is in its way.",
         )
 
