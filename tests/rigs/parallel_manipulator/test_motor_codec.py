@@ -148,6 +148,6 @@ def test_limits_are_rounded_down_and_never_to_nothing():
     for of, value in (
         (options.speed, 0.0004), (options.current, 13.0), (options.increments, math.nan), (options.increments, 1e9),
     ):  # fmt: skip
-        with pytest.raises(RigError, match="The drive has no"):
+        with pytest.raises(RigError, match="drive"):
             of(value)
     assert FaulhaberOptions(speed_unit_m_s=1e-6).speed(0.0004) == 400
