@@ -58,25 +58,7 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert made.out
 
 
-# In this process, and in one that is started once ---------------------------------------------------------------------
-
-
-def rig_goes_wrong(made, name, trigger):
-    change = FAULTS.changed({name: 0.0}, made.setting, made.clock)
-
-    def beats(beat, since_s):
-        changed = change(beat, since_s) if beat.state == "ramp" else beat
-        if changed is None:
-            # No beat for longer than is allowed; then the rig is back.
-            made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
-            return beat
-        return changed
-
-    made.press(beats)
-    report = made.ended()
-    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
-    assert made.out
-    assert made.world.largest_n < made.setting.allowed_n
+# In a process that is started once ---------------------------------------------------------------------
 
 
 def force_goes_wrong(made, name, trigger):
@@ -104,43 +86,52 @@ def in_process(started_once):
     return started_once
 
 
-@pytest.fixture(params=["local", "process"])
-def either(request):
-    return request.getfixturevalue({"local": "made", "process": "in_process"}[request.param])
-
-
-class TestInEitherProcess:
+class TestInAProcess:
     """What passes between a rig and a guard in another process: one of each class; the rest is in virtual time."""
 
     @pytest.mark.parametrize(
         ("name", "trigger"),
         [("rig hangs", Trigger.BEAT_OLD), ("steps not numbers", Trigger.COMMANDS_REFUSED)],
     )
-    def test_a_rig_that_goes_wrong(self, either, name, trigger):
-        rig_goes_wrong(either, name, trigger)
+    def test_a_rig_that_goes_wrong(self, in_process, name, trigger):
+        change = FAULTS.changed({name: 0.0}, in_process.setting, in_process.clock)
 
-    def test_a_force_that_is_too_large(self, either):
-        force_goes_wrong(either, "one sample above the ceiling", Trigger.FORCE_CEILING)
+        def beats(beat, since_s):
+            changed = change(beat, since_s) if beat.state == "ramp" else beat
+            if changed is None:
+                # No beat for longer than is allowed; then the rig is back.
+                in_process.guard.advance(in_process.clock() + round(1.5e9 * in_process.setting.limits.heartbeat_s))
+                return beat
+            return changed
 
-    def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(self, either):
-        either.press(after(0.2, lambda beat: replace(beat, command=CommandKind.STEP, distance_m=1e-3)))
-        report = either.ended()
+        in_process.press(beats)
+        report = in_process.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+        assert in_process.out
+        assert in_process.world.largest_n < in_process.setting.allowed_n
+
+    def test_a_force_that_is_too_large(self, in_process):
+        force_goes_wrong(in_process, "one sample above the ceiling", Trigger.FORCE_CEILING)
+
+    def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(self, in_process):
+        in_process.press(after(0.2, lambda beat: replace(beat, command=CommandKind.STEP, distance_m=1e-3)))
+        report = in_process.ended()
         assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.COMMANDS_REFUSED)
         with pytest.raises(GuardRefusesError, match="fault"):
-            either.guard.arm(either.setting.limits)
-        again = either.guard.beat(Beat(either.clock(), command=CommandKind.STEP, distance_m=1e-6))
+            in_process.guard.arm(in_process.setting.limits)
+        again = in_process.guard.beat(Beat(in_process.clock(), command=CommandKind.STEP, distance_m=1e-6))
         assert (again.accepted, again.state) == (False, GuardState.FAULT)
-        assert either.guard.disarm().state is GuardState.IDLE
-        assert either.press().phase == "over"
+        assert in_process.guard.disarm().state is GuardState.IDLE
+        assert in_process.press().phase == "over"
 
-    def test_a_retreat_that_is_commanded_is_no_fault(self, either):
-        either.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
-        report = either.ended()
+    def test_a_retreat_that_is_commanded_is_no_fault(self, in_process):
+        in_process.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
+        report = in_process.ended()
         assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
-        assert either.out
+        assert in_process.out
 
-    def test_what_is_wrong_before_the_first_motion_is_refused(self, either):
-        limits, before_m = either.setting.limits, either.world.position_m
+    def test_what_is_wrong_before_the_first_motion_is_refused(self, in_process):
+        limits, before_m = in_process.setting.limits, in_process.world.position_m
         for wrong, message in (
             ({"travel_m": (-4e-3, 2e-3)}, "retreat"),
             ({"travel_m": (-7e-3, 2e-3)}, "ends"),
@@ -149,9 +140,9 @@ class TestInEitherProcess:
             ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "while travelling"),
         ):
             with pytest.raises(GuardRefusesError, match=message):
-                either.guard.arm(replace(limits, **wrong))
-        assert either.world.position_m == pytest.approx(before_m, abs=1e-9)
-        assert either.guard.arm(limits).state is GuardState.ARMED
+                in_process.guard.arm(replace(limits, **wrong))
+        assert in_process.world.position_m == pytest.approx(before_m, abs=1e-9)
+        assert in_process.guard.arm(limits).state is GuardState.ARMED
 
     def test_a_rig_that_takes_nothing_for_long_gets_its_reports(self, in_process):
         guard, limits = in_process.guard, in_process.setting.limits
@@ -180,10 +171,9 @@ def test_what_came_before_it_was_armed_is_not_handed_over_afterwards(made):
     assert made.guard.force_blocks() == made.guard.motor_blocks() == []
 
 
-@pytest.mark.parametrize("baud", [9600, 115200])
-def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(baud, tmp_path):
-    """The step rule, on the motor's line: no increment before the drive has said that the one before has ended."""
-    with rig("local", tmp_path, FAULTS.Setting(baud=baud, period_s=5e-3)) as made:
+def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(tmp_path):
+    """The step rule, on the motor's line: no increment before the drive has reported the end of the one before."""
+    with rig("local", tmp_path, FAULTS.Setting(baud=9600, period_s=5e-3)) as made:
         press = made.press()
         assert press.phase == "over"
         assert any(report.early for report in press.reports)

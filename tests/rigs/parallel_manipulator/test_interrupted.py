@@ -7,18 +7,7 @@ from tactbench.core.recording.reader import open_recording
 from tests.core.cli.terminals import on_terminal, plain
 from tests.rigs.parallel_manipulator.spring import EXAMPLE
 
-RECORD = [
-    "-m",
-    "tactbench",
-    "record",
-    "--rig-file",
-    "rig.yaml",
-    "--sensor",
-    "icub",
-    "--profile",
-    "ramp:duration=8",
-    "--live",
-]
+RECORD = ["-m", "tactbench", "record", "--rig-file=rig.yaml", "--sensor=icub", "--profile=ramp:duration=8", "--live"]
 SHOWN = re.compile(r"([\d.]+) of 8\.0 s")
 
 

@@ -85,32 +85,11 @@ def test_the_recording_says_what_happened(five_newtons):
     assert abs(five_newtons.press.contact_m - 1e-3 * drawn["skin mm"]) < 30e-6  # 0.05 N on 5 N/mm, and its noise
 
 
-def test_follows_a_slow_ramp_as_theory_says():
-    # Of a ramp of 5 N in 60 s the first 10 s, with the loop's gains of k K = 10: 6.1 mN behind, whatever the stiffness.
-    scene = ramp(9.5 / 12.0, 0.5, 10.0)
-    found = on_spring(20.0, scene, noise_n=0.007, **(QUICK | {"settings__force_loop__integral_mm_n_s": 0.5}))
-    t_s = found.t_s["force_torque"]
-    on_ramp = t_s > 4
-    off = (found.force_n - np.interp(t_s, *scene.profile.corners))[on_ramp]
-    # 6000 samples of 7 mN move the mean by 0.1 mN.
-    assert off.mean() == pytest.approx(-6.1e-3, abs=0.75e-3)
-    motor_s, motor_m = found.t_s["motor"], found.data["motor"][:, 0]
-    true = 20e3 * (motor_m - 1e-3 * found.acquisition.drawn["skin mm"])
-    true_off = (true - np.interp(motor_s, *scene.profile.corners))[motor_s > 4]
-    assert true_off.std() <= 7e-3
-
-
-@pytest.mark.parametrize("stiffness", [5.0, 20.0])
-def test_a_first_touch_stays_within_its_bound(stiffness):
+def test_a_first_touch_stays_within_its_bound():
     # 0.31 N at 20 N/mm, 0.5 mm/s with a control period of 10 ms; the guard looks every millisecond.
-    found = on_spring(
-        stiffness, ramp(0.3, 0.3, 0.6), settings__touch__touch_speed_mm_s=0.5,
-        **(QUICK | {"settings__force_loop__integral_mm_n_s": 10.0 / stiffness}),
-    )  # fmt: skip
-    bound = largest_force_n(0.1, 1e3 * stiffness, 0.5e-3, 1.0, 0.02)
-    assert 0.1 < found.press.touch_n <= bound
-    if stiffness == 20.0:
-        assert bound <= 0.31
+    changes = QUICK | {"settings__force_loop__integral_mm_n_s": 0.5, "settings__touch__touch_speed_mm_s": 0.5}
+    found = on_spring(20.0, ramp(0.3, 0.3, 0.6), **changes)
+    assert 0.1 < found.press.touch_n <= largest_force_n(0.1, 20e3, 0.5e-3, 1.0, 0.02) <= 0.31
 
 
 def test_a_motor_that_finds_its_place_at_an_end_stop_presses():
