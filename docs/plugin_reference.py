@@ -26,9 +26,7 @@ RIG_FILES = {
     "Options of net-ft": (f"{_MANIPULATOR}.force_torque.net_ft.codec",),
     "Options of every axis": ("tactbench.devices.positioner",),
     "Options of faulhaber, beside those of every axis": (f"{_MANIPULATOR}.motor.profile",),
-    "Settings of parallel-manipulator": tuple(
-        f"{_MANIPULATOR}.{one}" for one in ("settings", "kinematics", "workspace")
-    ),
+    "Settings of parallel-manipulator": (f"{_MANIPULATOR}.settings", f"{_MANIPULATOR}.kinematics"),
 }
 """Chapters of ``rig-files.md`` and the modules whose models they describe."""
 _MODELS = {"Frozen", "DeviceEntry", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}

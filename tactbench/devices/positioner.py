@@ -307,15 +307,26 @@ class Positioner(Driver):
         self._moving, self._goal, self._nearest, self._retreats = True, target, math.inf, False
         self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
-    def see(self, t_ns: int, position: float, *, idle: bool) -> None:
-        """Note an answer: when and where, and whether the controller says that it stands.
+    def see(
+        self,
+        t_ns: int,
+        position: float,
+        *,
+        idle: bool,
+        target: float | None = None,
+        current_a: float = math.nan,
+        problem: str = "",
+    ) -> None:
+        """Note an answer: when and where, and whether the controller says that it stands; more where it says more.
 
         A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
         A halt has ended when it stands and the position is that of the answer before. What is homed and goes on after
         the time of braking is halted again.
         """
         last, halted, facts = self.position, math.isnan(self._goal), self.facts
-        self.note(PositionerState(t_ns, position, position if halted else self._goal))
+        if target is None:
+            target = position if halted else self._goal
+        self.note(PositionerState(t_ns, position, target, current_a, problem))
         off = abs(position - (last if halted else self._goal))
         if idle and off <= (facts.resolution if halted else facts.near):
             self._moving, self._halts = False, 0

@@ -1,4 +1,4 @@
-"""Links by name: the text that a rig file gives, and the link it stands for."""
+"""Addresses of links: the text in a rig file, and the link that it names."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ KINDS = MappingProxyType(
         "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
     }
 )
-"""Kind of link -> how its address looks and which keys it has; those of ``can`` are python-can's."""
+"""Kind of link -> example and keys of its address; the keys of ``can`` are python-can's."""
 
 
 class LinkAddress(NamedTuple):
-    """What names a link: ``scheme://target?key=value&key=value``, every part of it understood."""
+    """The parts of an address ``scheme://target?key=value&key=value``."""
 
     kind: str
     """A key of :data:`KINDS`."""
@@ -69,7 +69,7 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hint: str = "") -> _Model:
-    """Return what is given as a model of `what`: a device, an address.
+    """Return the given options as a model of `what`: a device, an address.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hin
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name = ".".join(map(str, first["loc"]))
-        about = f"The option {name!r} of {what}" if name else f"What is said of {what}"
+        about = f"The option {name!r} of {what}" if name else f"The entry of {what}"
         problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
         raise UsageError(
             f"{about} {problem.replace('Value error, ', '')}.", hint=hint or "See docs/hardware.md, The rig file."
@@ -99,11 +99,11 @@ def parse_address(text: str) -> LinkAddress:
     UnknownNameError
         If the scheme, the kind of bus or a key is unknown; the message has the nearest ones.
     UsageError
-        If a part is missing, given twice or not what is expected; the message has an example.
+        If a part is missing, given twice or wrong; the message has an example.
     """
     kind, separator, rest = text.partition("://")
     if not separator:
-        raise _wrong(text, "serial", "is not that of a link")
+        raise _wrong(text, "serial", "has no ://")
     target, _, query = rest.partition("?")
     target = unquote(target)
     if kind == "spi":
@@ -117,7 +117,7 @@ def parse_address(text: str) -> LinkAddress:
         if (interface := target.partition("/")[0]) not in can.VALID_INTERFACES:
             raise UnknownNameError("kind of can:// link", interface, sorted(can.VALID_INTERFACES))
     if kind != "loop" and not (target.partition("/")[2] if kind == "can" else target):
-        raise _wrong(text, kind, "does not say what to open")
+        raise _wrong(text, kind, "lacks its target")
     if kind in ("udp", "socket") and not all(_host_and_port(target)):
         raise _wrong(text, kind, "does not end in a host and a port, 1 to 65535")
     return LinkAddress(kind, target, MappingProxyType(_options(text, kind, query)))
@@ -131,7 +131,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     address
         As in ``docs/links.md``.
     clock
-        Stamps what is received.
+        Gives the times of receipt.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
 
 
 def _host_and_port(target: str) -> tuple[str, int]:
-    """Return them, empty and 0 where they are not there."""
+    """Return host and port, empty and 0 where they are missing."""
     try:
         parts = urlsplit(f"//{target}")
         return parts.hostname or "", parts.port or 0

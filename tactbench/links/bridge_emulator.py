@@ -1,6 +1,6 @@
 """The SPI bridge as a model, fed and polled like an emulated device: bytes in, bytes out, on a clock passed in.
 
-Also the reference for its firmware: what it answers to what, ``docs/links.md`` says in words.
+It is the reference for the firmware, which ``docs/links.md`` specifies.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
 Exchange = Callable[[int, bytes, float], bytes]
-"""What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
+"""A device on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
 
 
 @dataclass
@@ -22,18 +22,18 @@ class BridgeEmulator:
     """A bridge with one SPI bus."""
 
     exchange: Exchange
-    """What hangs on the bus."""
+    """The device on the bus."""
     holds: int = 4
     """Batches it can hold, the running one included."""
     largest_payload: int = 4096
     """Bytes of payload it can take."""
     select_lines: int = 0xFF
-    """Mask of the lines it has."""
+    """Mask of its select lines."""
     fastest_hz: int = 10_000_000
-    """The highest clock it can run, hertz."""
+    """Its highest clock, hertz."""
     faults: set[str] = field(default_factory=set)
-    """What goes wrong now: ``dropped`` (batches are carried out, their replies are not sent), ``doubled`` (replies are
-    sent twice), ``damaged`` (one bit of each reply is turned)."""
+    """Present faults: ``dropped`` (batches run, their replies are not sent), ``doubled`` (replies are sent twice),
+    ``damaged`` (one bit of each reply is inverted)."""
 
     def __post_init__(self) -> None:
         self._speed_hz = 0
@@ -42,7 +42,7 @@ class BridgeEmulator:
         self._due: deque[tuple[float, bytes]] = deque()
 
     def feed(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """Take bytes from the host and return what is sent by now, each piece with its second."""
+        """Take bytes from the host and return the pieces sent by now, each with its second."""
         out = self.poll(now_s)
         out += [(now_s, answer) for frame in self._decoder.feed(data) if (answer := self._answered(frame, now_s))]
         return out + self.poll(now_s)
@@ -57,17 +57,17 @@ class BridgeEmulator:
         return out
 
     def next_s(self) -> float:
-        """Return when the next reply is due; infinite: none is."""
+        """Return the time of the next reply; infinite: none is due."""
         return self._due[0][0] if self._due else math.inf
 
     def _answered(self, frame: Frame, now_s: float) -> bytes:
         try:
-            return self._carried_out(frame, now_s)
+            return self._executed(frame, now_s)
         except (ValueError, struct.error):
             return encode_frame(Frame(Kind.ERROR.reply, frame.number, b"malformed or not possible"))
 
-    def _carried_out(self, frame: Frame, now_s: float) -> bytes:
-        """Return the reply, empty where it comes later; raises ValueError or struct.error where it is to be refused."""
+    def _executed(self, frame: Frame, now_s: float) -> bytes:
+        """Return the reply, empty where it is sent later; raises ValueError or struct.error for a refused request."""
         if frame.version != VERSION or len(frame.payload) > self.largest_payload:
             raise ValueError
         match Kind(frame.kind):

@@ -1,4 +1,4 @@
-"""Byte streams: serial ports, pseudo-terminals, TCP sockets and whatever else pyserial has a URL for."""
+"""Byte streams: serial ports, pseudo-terminals, TCP sockets and other URLs of pyserial."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class ByteLink(Link):
     silence_hint = f"{Link.silence_hint} Many boards start anew when their port is opened (DTR), and need some seconds."
 
     def receive(self, timeout_s: float) -> Received:
-        """Return what :meth:`read` does."""
+        """Return the result of :meth:`read`."""
         return self.read(timeout_s)
 
     @abstractmethod
     def read(self, timeout_s: float) -> Received:
-        """Return what has come, as soon as that is one byte; raises as every :class:`Link`."""
+        """Return all bytes received, as soon as there is one; raises as every :class:`Link`."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Hand `data` over to be sent; raises as every :class:`Link`."""
+        """Send `data`; raises as every :class:`Link`."""
 
 
 class SerialLink(ByteLink):
@@ -47,7 +47,7 @@ class SerialLink(ByteLink):
     parity, stop_bits
         Of each byte of eight data bits.
     clock
-        Stamps what is received.
+        Gives the times of receipt.
 
     Raises
     ------
@@ -79,8 +79,8 @@ class SerialLink(ByteLink):
             )
         except _NOT_OPENED as error:
             raise cannot_open(port, error) from error
-        # Waiting for the file descriptor gives the earliest stamp, and leaves the port's settings alone: pyserial sets
-        # all of them anew for each change of its time-out. Windows' ports, loop and rfc2217 have no descriptor.
+        # Waiting for the file descriptor gives the earliest stamp, and does not touch the port's settings: pyserial
+        # sets all of them anew for each change of its timeout. Windows' ports, loop and rfc2217 have no descriptor.
         self._ready: selectors.BaseSelector | None = None
         try:
             descriptor = self._port.fileno()

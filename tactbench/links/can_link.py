@@ -18,14 +18,14 @@ from tactbench.core.errors import LinkError, UnknownNameError
 from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
 
 WAITED_S = 60.0
-"""A frame does not wait longer in a kernel's queue (assumed): a stamp that says so is not taken."""
+"""Longest wait of a frame in a kernel's queue (assumed): an older stamp is not used."""
 SYSTEMS_OWN_NS = 5_000_000
-"""Stamps that lag no more behind the system's clock are that clock's own, and those that scatter by more are refused
-(assumed: a wake-up takes less)."""
+"""Largest lag of stamps by the system's own clock, and largest scatter of stamps that are used (assumed: a wake-up
+takes less)."""
 LEAST_OF = 200
-"""Frames of which one at least was read as it came, where none was waited for (assumed)."""
+"""Frames of which one at least was read on receipt, where the reader waited for none (assumed)."""
 WINDOW_NS = 5_000_000_000
-"""The least age is looked for in this one and the one before (assumed: at 100 ppm, 1 ms meanwhile)."""
+"""The least age is that of this window and the one before (assumed: at 100 ppm, 1 ms meanwhile)."""
 _HEX = r"[\dA-Fa-f]"
 _SLCAN = re.compile("|".join([
     *(rf"(?:t{_HEX}{{3}}|[Tx]{_HEX}{{8}}){n}{_HEX}{{{2 * n}}}(?:{_HEX}{{4}}(?=[tTrRx]|$))?" for n in range(9)),
@@ -35,7 +35,7 @@ _SLCAN = re.compile("|".join([
 
 
 def _raised(*others: type[Exception]) -> tuple[type[Exception], ...]:
-    """Return what python-can and the system raise, and others."""
+    """Return the errors of python-can and of the system, and others."""
     import can
 
     return (can.CanError, *SYSTEM_ERRORS, *others)
@@ -51,7 +51,7 @@ class CanFrame:
     """At most 8 bytes."""
     extended: bool = False
     t_ns: int = 0
-    """When the kernel or the adapter had it, nanoseconds of the link's clock; of a log: since its first. Not sent."""
+    """Receipt by kernel or adapter, nanoseconds of the link's clock; of a log: since its first frame. Not sent."""
 
 
 class CanLink(Link):
@@ -60,7 +60,7 @@ class CanLink(Link):
     Attributes
     ----------
     counts
-        How many were left out so far: ``error frames``, ``remote and FD frames``, ``unreadable frames``.
+        Frames left out: ``error frames``, ``remote and FD frames``, ``unreadable frames``.
     """
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
@@ -97,11 +97,11 @@ def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | Non
 
 
 class _Stamps:
-    """Puts python-can's stamps, seconds since 1970 or since an adapter's start, on a link's clock.
+    """Converts python-can's stamps, seconds since 1970 or since an adapter's start, to a link's clock.
 
-    A stamp's age is what the system's clock says at receipt, less the stamp. A frame that was waited for has just come,
-    and of some hundred one has: the least age of late is by how much the clock of the stamps lags. Where the system's
-    clock is set meanwhile, frames that wait have stamps of before: the age is by the clock that makes it least.
+    A stamp's age is the system's time at receipt less the stamp. A frame that the reader waited for has just been
+    received, as has one of some hundred others: the least recent age is the lag of the stamps' clock. Where the
+    system's clock is set meanwhile, queued frames have stamps of the earlier one: the least age of both is used.
     """
 
     def __init__(self, clock: Clock, wall: Clock = time.time_ns) -> None:
@@ -110,20 +110,20 @@ class _Stamps:
         self._least: deque[tuple[int, int]] = deque(maxlen=2)
         self._seen, self._known = 0, False
         self._late: deque[int] = deque(maxlen=31)
-        """By how much stamps of frames that were waited for are older than the least age."""
+        """Ages of frames that the reader waited for, less the least age."""
 
     @property
     def refused(self) -> bool:
-        """Whether stamps scatter too much to be times: half of the frames that had just come were said to be old."""
+        """Whether stamps scatter too much to be times: half of the frames just received had old ones."""
         return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
 
     def lag_ns(self) -> int:
-        """Return by how much the clock of the stamps lags behind the system's; 0: it is that one, or not known yet."""
+        """Return the lag of the stamps' clock behind the system's; 0: it is that one, or not known yet."""
         least_ns = min((least_ns for _, least_ns in self._least), default=0)
         return least_ns if self._known and abs(least_ns) > SYSTEMS_OWN_NS else 0
 
     def __call__(self, stamp_s: float, *, waited: bool) -> int:
-        """Return when a frame came, which was waited for or not."""
+        """Return the time of receipt of a frame; `waited`: whether the reader waited for it."""
         now_ns, lag_ns = self._clock(), self.lag_ns()
         wall_ns = self._wall() - now_ns
         if self._walls and abs(wall_ns - self._walls[-1]) < SYSTEMS_OWN_NS:
@@ -148,15 +148,15 @@ class _Stamps:
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
-    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), put on the link's clock. Where
-    stamps lag behind the system's clock, the least age is taken off, and such frames are counted.
+    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), converted to the link's clock.
+    Where stamps lag behind the system's clock, the least age is subtracted, and such frames are counted.
 
     Parameters
     ----------
     interface, channel
         As python-can names them: ``socketcan`` with ``can0``, ``pcan`` with ``PCAN_USBBUS1``, ``slcan`` with a port …
     clock
-        Stamps what is received.
+        Gives the times of receipt.
     options
         Of the interface, by python-can's names: ``bitrate``, ``tty_baudrate``, ``port`` …
 
@@ -184,10 +184,8 @@ class CanBus(CanLink):
             raise cannot_open(self.address, error, hint=_hint(interface, channel, error)) from error
         self._stamp = _Stamps(clock)
         if interface == "slcan":
-            self._tidy_lines()
-
-    def _tidy_lines(self) -> None:
-        self._read_line, self._bus._read = self._bus._read, self._slcan_frame
+            bus: Any = self._bus
+            self._read_line, bus._read = bus._read, self._slcan_frame
 
     def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
         deadline = self._usable(timeout_s)
@@ -216,10 +214,10 @@ class CanBus(CanLink):
         raise self._nothing_came(timeout_s)
 
     def _slcan_frame(self, timeout_s: float | None) -> str | None:
-        """Return the next frame of python-can's slcan, which takes what stands between two CR or BEL for one.
+        """Return the next frame of python-can's slcan, which takes all between two CR or BEL for one.
 
-        Line feeds are left out; frames whose CR was lost are given one by one; what is none is counted, and an answer
-        BEL, which is an adapter's word for an error.
+        Line feeds are left out; frames whose CR was lost are returned one by one; unreadable text is counted, and BEL,
+        by which an adapter reports an error.
         """
         line: str | None = self._read_line(timeout_s)
         if not line:
@@ -255,16 +253,15 @@ class CanBus(CanLink):
             raise self._unplugged(error) from error
 
     def _release(self) -> None:
-
         try:
             self._bus.shutdown()
         except _raised():
-            # slcan's says goodbye before it closes its port, to an adapter that may be gone.
+            # slcan's writes to the adapter, which may be gone, before it closes its port.
             self._bus.serialPortOrig.close()
 
 
 def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
-    """Return the data frames of a log in any format of python-can, and what was left out (:class:`CanLink`).
+    """Return the data frames of a log in any format of python-can, and counts of others (:class:`CanLink`).
 
     Stamps are nanoseconds since the log's first message. BLF stamps come within 0.25 us, since python-can returns
     float64.
@@ -289,7 +286,7 @@ def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
         if file.suffix.lower() == ".asc" and b"timestamps relative" in b" ".join(file.read_bytes()[:4096].split()):
             raise ValueError("its times are relative to the event before; export it with absolute ones")
         with can.LogReader(file) as log:
-            for number, message in enumerate(log, 1):  # noqa: B007  (said where it is damaged)
+            for number, message in enumerate(log, 1):  # noqa: B007  (in the message of a damaged log)
                 began_s = message.timestamp if began_s is None else began_s
                 frame = _data_frame(message, round((message.timestamp - began_s) * 1e9), counts)
                 frames += [] if frame is None else [frame]

@@ -11,8 +11,8 @@ from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_
 LARGEST_DATAGRAM = 65507
 """Bytes: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
 BUFFER_BYTES = 4 << 20
-"""Asked of the system for what is not yet read; it may give less. The usual 212 992 hold 256 datagrams of 36 bytes, a
-quarter of a second at 1 kHz (measured on Linux); what does not fit is lost without an error."""
+"""Requested size of the system's buffer, which may be smaller. The usual 212 992 hold 256 datagrams of 36 bytes, a
+quarter of a second at 1 kHz (measured on Linux); datagrams that do not fit are lost without an error."""
 
 
 class DatagramLink(Link):
@@ -22,7 +22,7 @@ class DatagramLink(Link):
     def receive(self, timeout_s: float) -> Received:
         """Return the next datagram, whole; raises as every :class:`Link`.
 
-        It is unplugged where the peer's host says that nobody listens there.
+        It is unplugged where the peer's host reports that the port is closed.
         """
 
     @abstractmethod
@@ -31,14 +31,14 @@ class DatagramLink(Link):
 
 
 class UdpLink(DatagramLink):
-    """Datagrams to and from one peer over UDP; those of others are not seen.
+    """Datagrams to and from one peer over UDP; those of others are not received.
 
     Parameters
     ----------
     host, port
         The peer.
     clock
-        Stamps what is received.
+        Gives the times of receipt.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What all links have in common: open when made, closed once, and named errors for what can go wrong."""
+"""The base of all links: open when made, closed once, and a named error for each kind of failure."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ try:
     SYSTEM_ERRORS: tuple[type[Exception], ...] = (OSError, termios.error)
 except ImportError:  # Windows has none
     SYSTEM_ERRORS = (OSError,)
-"""What the system raises: the error of terminals is no OSError, and passes pyserial where a port has gone."""
+"""Errors of the system: that of terminals is no OSError, and passes through pyserial where a port has gone."""
 
 Clock = Callable[[], int]
 """Returns nanoseconds of a clock that never goes back, as :func:`time.monotonic_ns` does."""
 
 WRITE_TIMEOUT_S = 1.0
-"""Assumed: the other end takes what is sent within this time, or is stuck. 9600 baud carry 960 bytes in it."""
+"""Longest time in which the other end takes data (assumed; 9600 baud carry 960 bytes in it)."""
 
 MOST_AT_ONCE = 4096
-"""Pieces of one :meth:`Link.receive_all`, 4 s at 1 kHz: a bus that never rests does not keep it for ever."""
+"""Pieces of one :meth:`Link.receive_all`, 4 s at 1 kHz: it returns also from a bus that never rests."""
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """Bytes and when the first of them was in the host."""
+    """Bytes and the time of receipt of the first of them."""
 
     data: bytes
     t_ns: int
@@ -43,17 +43,16 @@ class Received:
 class Link(ABC):
     """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock; 0 asks without waiting. Every read
-    and write raises LinkTimeout if nothing came or the other end took nothing in time (:data:`WRITE_TIMEOUT_S` for what
-    is sent), LinkUnplugged if device or other end is gone, LinkClosed once it was closed, and LinkError for what is not
-    possible.
+    One thread uses a link. Timeouts are counted by :meth:`timer`, whatever the clock; with 0 a read returns at once.
+    Every read and write raises LinkTimeout if nothing was received or taken in time (:data:`WRITE_TIMEOUT_S` for
+    writes), LinkUnplugged if device or other end is gone, LinkClosed once it was closed, and LinkError otherwise.
 
     Parameters
     ----------
     address
-        What it is called in messages.
+        Its name in messages.
     clock
-        Stamps what is received.
+        Gives the times of receipt.
     """
 
     silence_hint = "Is the device on, started and set to the same speed? Then wait longer."
@@ -77,13 +76,13 @@ class Link(ABC):
             self._release()
 
     def timer(self) -> float:
-        """Return the seconds by which its waits are counted: real ones, or virtual ones where time is virtual."""
+        """Return the seconds of its timeouts: real ones, or virtual ones where time is virtual."""
         return time.monotonic()
 
     def receive_all(self, timeout_s: float) -> list[Any]:
-        """Return all that has come, waiting at most so long for the first; an empty list: nothing came.
+        """Return all pieces received, waiting at most so long for the first; an empty list: there is none.
 
-        Raises as a read does; what came before the link was unplugged is handed out first.
+        Raises as a read does; pieces received before the link was unplugged are returned first.
         """
         found: list[Any] = []
         with suppress(LinkTimeout):
@@ -97,31 +96,31 @@ class Link(ABC):
         return found
 
     def discard(self) -> None:
-        """Drop what has come and was not read; what is still under way comes later. Raises as a read does."""
+        """Drop all pieces received so far, not those still under way. Raises as a read does."""
         self.receive_all(0.0)
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Any:
-        """Return the next that has come, waiting for it at most so long."""
+        """Return the next piece, waiting for it at most so long."""
 
     def _sendable(self, piece: Any) -> None:
-        """Raise what sending raises of a link that is closed or unplugged, and of what cannot be sent."""
+        """Raise LinkError for a link that is closed or unplugged, and for a piece that cannot be sent."""
         self._usable()
 
     @abstractmethod
     def _release(self) -> None:
-        """Give back what the link holds; called once, also after the other end is gone, and raises nothing."""
+        """Release the link's resources; called once, also after the other end is gone, and raises nothing."""
 
     def _usable(self, timeout_s: float = 0.0) -> float:
-        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`; raises as every :class:`Link`."""
+        """Return the end of a wait of `timeout_s`, in seconds of :meth:`timer`; raises as every :class:`Link`."""
         if self._closed:
             raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
         if self._loss is not None:
             raise self._unplugged(self._loss)
         if not 0 <= timeout_s < math.inf:
             raise LinkError(
-                f"{self.address}: a time-out of {timeout_s} s was given, a finite one of 0 or more was expected.",
-                hint="Use 0 to ask without waiting.",
+                f"{self.address}: the timeout is {timeout_s} s; a finite one of 0 or more was expected.",
+                hint="Use 0 to return at once.",
             )
         return self.timer() + timeout_s
 
@@ -134,14 +133,13 @@ class Link(ABC):
 
     def _nothing_came(self, timeout_s: float) -> LinkTimeout:
         return LinkTimeout(
-            f"Nothing came from {self.address} within {timeout_s:g} s.",
+            f"Nothing was received from {self.address} within {timeout_s:g} s.",
             hint=self.silence_hint,
         )
 
     def _not_sent(self, cause: BaseException) -> LinkTimeout:
         return LinkTimeout(
-            f"{self.address} did not take what was sent within {WRITE_TIMEOUT_S:g} s ({cause}); part of it may have "
-            "gone out.",
+            f"{self.address} did not take all data within {WRITE_TIMEOUT_S:g} s ({cause}); part may have been sent.",
             hint="Is the other end reading, or, on CAN, does any node acknowledge?",
         )
 
@@ -171,7 +169,7 @@ def os_error_in(error: BaseException) -> OSError | None:
 
 
 def cannot_open(address: str, error: BaseException, *, hint: str = "") -> LinkError:
-    """Return the error of a link that does not open, with the next step for the system's reason."""
+    """Return the error of a link that does not open, with a hint for the system's reason."""
     reason = os_error_in(error)
     number = reason.errno if reason is not None and reason.errno is not None else 0
     return LinkError(f"{address} cannot be opened: {error}.", hint=hint or _HINTS.get(number, "Check its address."))

@@ -28,7 +28,7 @@ _LARGEST_FRAME = (_HEAD.size + LARGEST_PAYLOAD + _CRC.size) * 255 // 254 + 2
 
 
 class Kind(IntEnum):
-    """What a frame of the SPI bridge is; a reply is its request's kind with the top bit set."""
+    """Kinds of frames; a reply has its request's kind with the top bit set."""
 
     HELLO = 0x01
     SETUP = 0x02
@@ -64,7 +64,7 @@ class FrameDecoder:
     Attributes
     ----------
     damaged
-        How many stretches between two zero bytes were no frame so far.
+        Number of stretches between two zero bytes that were no frame.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class FrameDecoder:
         self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes; what is no frame is counted."""
+        """Return the frames that `data` completes, and count stretches that are no frame."""
         *ended, rest = (self._pending + data).split(b"\0")
         self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
         found = [_frame_in(stuffed) for stuffed in ended if stuffed]
@@ -123,12 +123,12 @@ SETUP = struct.Struct("<IB")
 STEP = struct.Struct("<BHH")
 """Head of a step in BATCH: select, pause in us, number of bytes."""
 BEGIN = struct.Struct("<I")
-"""Head of the reply to BATCH: when it began, us."""
+"""Head of the reply to BATCH: its beginning, us."""
 FULL = b"full"
-"""Why a bridge refuses a batch that it cannot hold."""
+"""Text of the refusal of a batch that the bridge cannot hold."""
 
 _ASK_S = 0.2
-"""Assumed: a bridge that runs answers HELLO within this time, else it is asked again."""
+"""Period of HELLO until the bridge answers (assumed)."""
 
 
 class SpiBridge(SpiLink):
@@ -137,23 +137,23 @@ class SpiBridge(SpiLink):
     Parameters
     ----------
     port
-        The bridge's port, open; it is closed with this link, or if this link cannot be made. Its clock stamps what is
-        received, its waits count time-outs.
+        The bridge's port, open; it is closed with this link, or if this link cannot be made. Times of receipt and
+        timeouts are by its clock and timer.
     speed_hz
         Clock of the SPI bus, at most, hertz.
     mode
         SPI mode, 0 to 3.
     wake_s
-        Seconds within which the bridge must answer: many microcontrollers start anew when their port is opened.
+        Longest time until the bridge answers: many microcontrollers start anew when their port is opened.
 
     Attributes
     ----------
     name, firmware
-        What the bridge says of itself.
+        The bridge's own.
     select_lines
-        Mask of the select lines it has.
+        Mask of its select lines.
     speed_hz
-        The SPI clock it runs, hertz.
+        Its SPI clock, hertz.
     holds
         Batches it holds, the running one included.
 
@@ -180,7 +180,7 @@ class SpiBridge(SpiLink):
             raise
 
     def timer(self) -> float:
-        """Return the seconds by which the port's waits are counted."""
+        """Return the seconds of the port's timeouts."""
         return self._bytes.timer()
 
     def _greet(self, wake_s: float) -> None:
@@ -192,7 +192,7 @@ class SpiBridge(SpiLink):
             except LinkTimeout as error:
                 if self.timer() >= deadline:
                     raise LinkError(
-                        f"{self.address}: nothing there answered as an SPI bridge within {wake_s:g} s.",
+                        f"{self.address}: no SPI bridge answered within {wake_s:g} s.",
                         hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
                     ) from error
         if len(hello.payload) < HELLO.size:
@@ -201,7 +201,7 @@ class SpiBridge(SpiLink):
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
 
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
-        """Send a request that is no batch, and return its reply; what else comes is not looked at."""
+        """Send a request that is no batch, and return its reply; other frames are dropped."""
         self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
         deadline = self.timer() + timeout_s
         while True:
@@ -217,7 +217,7 @@ class SpiBridge(SpiLink):
                 return frame
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
-        """Return the next frame and when its end was in the host."""
+        """Return the next frame and the time of receipt of its end."""
         while not self._frames:
             left_s = deadline - self.timer()
             try:
@@ -232,7 +232,7 @@ class SpiBridge(SpiLink):
         payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
         if len(payload) > self._largest:
             raise LinkError(
-                f"{self.address}: a batch of {len(payload)} bytes was given, the bridge takes {self._largest}.",
+                f"{self.address}: the batch has {len(payload)} bytes, the bridge takes {self._largest}.",
                 hint="Send it in parts.",
             )
         self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
@@ -247,7 +247,7 @@ class SpiBridge(SpiLink):
                 continue  # doubled or late
             if frame.kind == Kind.ERROR.reply:  # may come before the replies to earlier batches, which still run
                 del self._waiting[frame.number]
-                if frame.payload == FULL:  # it still has batches that were given up here: this one is lost, too
+                if frame.payload == FULL:  # it still has batches that were abandoned here: this one is lost, too
                     continue
                 raise self._refused(frame)
             for number in list(self._waiting):
@@ -271,8 +271,7 @@ class SpiBridge(SpiLink):
 
     def _nonsense(self, frame: Frame) -> LinkError:
         return LinkError(
-            f"{self.address}: the bridge's reply to request {frame.number} has {len(frame.payload)} bytes, other than "
-            "asked for.",
+            f"{self.address}: the bridge's reply to request {frame.number} has a wrong length, {len(frame.payload)}.",
             hint="Is its firmware that of docs/links.md?",
         )
 

@@ -16,41 +16,40 @@ class SpiStep:
     """One transfer: select, exchange bytes, release, pause."""
 
     data: bytes
-    """What goes out; as many bytes come in. Empty: only the pause."""
+    """Bytes to send; as many are received. Empty: only the pause."""
     select: int = 1
-    """Mask of the select lines that are active meanwhile, line i being bit i; what the wires do with it is the
-    board's."""
+    """Mask of the active select lines, line i being bit i; their wiring is that of the board."""
     pause_us: int = 0
     """Microseconds that no line is active afterwards, at least; up to 65535."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpiReply:
-    """What came in during one batch."""
+    """The bytes received during one batch."""
 
     number: int
-    """What :meth:`SpiLink.send` returned for it."""
+    """The number that :meth:`SpiLink.send` returned for it."""
     data: tuple[bytes, ...]
     """As many as the batch has steps, each as long as its step's data."""
     t_ns: int
-    """When it was in the host, nanoseconds of the link's clock."""
+    """Time of receipt, nanoseconds of the link's clock."""
     device_us: int | None = None
-    """When the batch began by the adapter's own counter of microseconds, modulo 2**32; None: it has none."""
+    """Beginning of the batch by the adapter's own counter of microseconds, modulo 2**32; None: it has none."""
 
 
 class SpiLink(Link):
     """Batches to an SPI bus, and their replies in the same order.
 
-    A batch is carried out without the host, so that pauses of some ten microseconds hold whatever the host does; and
-    the next may be sent before the reply to the last one is here. An adapter of another kind is a subclass with
-    :meth:`send`, :meth:`receive`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
+    The adapter executes a batch without the host, so that pauses of some ten microseconds hold; the next may be sent
+    before the reply to the last one is received. An adapter of another kind is a subclass with :meth:`send`,
+    :meth:`receive`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
 
     Attributes
     ----------
     speed_hz
         The SPI clock it runs, hertz.
     holds
-        Batches that may be sent before the first of them is answered; 1 where :meth:`send` itself carries them out.
+        Batches that may be sent before the first of them is answered; 1 where :meth:`send` itself executes them.
     """
 
     speed_hz: int
@@ -62,16 +61,16 @@ class SpiLink(Link):
     def send(self, steps: Sequence[SpiStep]) -> int:
         """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` at once.
 
-        Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. What else the adapter refuses,
-        :meth:`receive` raises.
+        Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. Other refusals of the adapter
+        are raised by :meth:`receive`.
         """
 
     @abstractmethod
     def receive(self, timeout_s: float) -> SpiReply:
-        """Return the next reply, raising as every :class:`Link`; where one was lost, its number is left out."""
+        """Return the next reply, raising as every :class:`Link`; the number of a lost one is missing."""
 
     def abandon(self) -> None:
-        """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
+        """Give up all outstanding replies; late ones are dropped. Raises nothing."""
 
     def _next_number(self) -> int:
         self._usable()
@@ -82,8 +81,8 @@ class SpiLink(Link):
 class SpidevLink(SpiLink):
     """A device ``/dev/spidevBUS.SELECT``.
 
-    A batch is carried out by this process when it is sent: pauses are at least as long as asked for, and longer when
-    the system has other work. Never run on a real device.
+    This process executes a batch when it is sent: pauses are at least as long as requested, and longer when the system
+    has other work. Never run on a real device.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ class SpidevLink(SpiLink):
     mode
         SPI mode, 0 to 3.
     clock
-        Stamps what is received.
+        Gives the times of receipt.
 
     Raises
     ------
@@ -127,7 +126,7 @@ class SpidevLink(SpiLink):
             for step in steps:
                 data.append(bytes(self._device.xfer2(list(step.data))) if step.data else b"")
                 released = time.perf_counter_ns()
-                # Shorter than a sleep can be: waits for tens of microseconds are spent here.
+                # Pauses of tens of microseconds are shorter than any sleep.
                 while time.perf_counter_ns() - released < 1000 * step.pause_us:
                     pass
         except OSError as error:

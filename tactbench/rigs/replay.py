@@ -20,7 +20,7 @@ class RecordingFolder(ReplayRig):
     Parameters
     ----------
     folder
-        Where to look. What a crash left behind (``….h5.partial``) and hidden files are passed over.
+        The folder. Files of a crash (``….h5.partial``) and hidden files are skipped.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -32,13 +32,13 @@ class RecordingFolder(ReplayRig):
         Raises
         ------
         MissingRecordingError
-            If there is no such folder, nothing in it, or less than an import meant.
+            If there is no such folder, it is empty, or an import into it was interrupted.
         """
         if not self.folder.is_dir():
             what = f"{self.folder} is no folder" if self.folder.exists() else f"There is no folder {self.folder}"
             raise MissingRecordingError(f"{what}.", hint=_HINT)
         found, unfinished = [], 0
-        for below, folders, names in os.walk(self.folder):  # passes over what vanishes meanwhile, or may not be read
+        for below, folders, names in os.walk(self.folder):  # skips folders that vanish or cannot be read
             if any(name.startswith(".placing-") for name in folders):
                 raise MissingRecordingError(
                     f"An import into {below} was interrupted while its recordings were moved there: some are missing.",
@@ -63,7 +63,7 @@ def build(context: RigContext) -> RecordingFolder:
     Raises
     ------
     UsageError
-        If nobody said where the recordings are.
+        If the context names no folder of recordings.
     """
     if context.recordings is None:
         raise UsageError(

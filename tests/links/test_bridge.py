@@ -153,10 +153,10 @@ def test_batches_are_answered_in_order(link):
 
 @needs_pty
 def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
-    with pytest.raises(LinkError, match="the bridge takes 1000"):
+    with pytest.raises(LinkError, match="1000"):
         link.send([SpiStep(bytes(1000))])
     link.send([SpiStep(b"a", 8)])
-    with pytest.raises(LinkError, match="refuses request 1: malformed"):
+    with pytest.raises(LinkError, match="malformed"):
         link.receive(2.0)
     assert transfer(link, b"\xff") == b"\x00"
 
@@ -177,7 +177,7 @@ def test_replies_that_do_not_come_are_a_timeout_then_a_gap_and_abandoned_leave_r
 
 @needs_pty
 def test_what_is_no_bridge_is_said(tmp_path):
-    with pty() as far, pytest.raises(LinkError, match="answered as an SPI bridge within"):
+    with pty() as far, pytest.raises(LinkError, match=r"0\.05 s"):
         SpiBridge(SerialLink(far.name), speed_hz=1000, wake_s=0.05)
 
 
@@ -188,5 +188,5 @@ def test_a_bridge_of_another_version_is_refused():
             about = HELLO.pack(2, 10, 1, 1)
             return [(now_s, encode_frame(Frame(Kind.HELLO.reply, 0, about, version=2)))] if data else []
 
-    with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
+    with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="version 2"):
         SpiBridge(SerialLink(far.name), speed_hz=1000)

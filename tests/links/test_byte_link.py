@@ -34,7 +34,7 @@ def test_an_error_of_the_terminal_is_the_links_own(far, monkeypatch, way):
 
     if way == "open":
         monkeypatch.setattr("serial.serial_for_url", gone)
-        with pytest.raises(LinkError, match="cannot be opened"):
+        with pytest.raises(LinkError, match="opened"):
             SerialLink(far.name)
         return
     with SerialLink(far.name) as link:
@@ -89,10 +89,10 @@ def test_stamp_is_taken_when_the_first_byte_is_there(far):
 
 
 def test_a_port_is_opened_by_one_only(far):
-    with SerialLink(far.name), pytest.raises(LinkError, match="Another program has it open"):
+    with SerialLink(far.name), pytest.raises(LinkError, match="Another program"):
         SerialLink(far.name)
 
 
 def test_a_far_end_that_does_not_read_is_a_timeout(far):
-    with SerialLink(far.name) as link, pytest.raises(LinkTimeout, match="did not take"):
+    with SerialLink(far.name) as link, pytest.raises(LinkTimeout):
         link.write(bytes(1 << 20))  # a pseudo-terminal holds some ten thousand

@@ -17,7 +17,6 @@ from tactbench.links.spi_bridge import Frame, FrameDecoder, Kind, SpiBridge, enc
 from tactbench.links.spi_link import SpiStep
 from tests.conftest import ROOT
 
-SKETCH = ROOT / "firmware" / "biotac_bridge" / "biotac_bridge.ino"
 STUB = ROOT / "tests" / "links" / "arduino"
 
 
@@ -71,10 +70,6 @@ def replies(link: Link, count: int) -> list[Frame]:
         found += decoder.feed(link.read(5.0).data)
     assert decoder.damaged == 0
     return found
-
-
-def test_it_is_short():
-    assert len(SKETCH.read_text(encoding="utf-8").splitlines()) <= 200
 
 
 def test_the_link_reads_through_it(program):

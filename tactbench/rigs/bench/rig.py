@@ -1,4 +1,4 @@
-"""The bench as a rig: a sensor and a reference force sensor are read while somebody presses, and nothing moves.
+"""The bench as a rig: a sensor and a reference force sensor are read while a person presses, and nothing moves.
 
 Devices that the rig file calls emulated sense what a simulated rig computes of the same scene, in virtual time; their
 links and drivers carry it as those of real ones do. What `tactbench emulate` runs in real time is a real device here.
@@ -60,7 +60,7 @@ class BenchAcquisition:
     duration_s: float
     force: PressingForce | None
     zero: Mapping[str, FloatArray]
-    """By stream of the force sensor: (channels,) what it read without load, taken off."""
+    """By stream of the force sensor: its (channels,) unloaded readings, which are subtracted."""
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
@@ -69,17 +69,17 @@ class BenchAcquisition:
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """By stream: what became of its rows."""
+        """The counts of rows by stream."""
         return self.reading.stream_counts
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What the drivers counted, by device and name."""
+        """The drivers' counts, by device and name."""
         return self.reading.counts
 
     @property
     def ended(self) -> str:
-        """Why it ended before its time; empty: it did not."""
+        """The reason for which it ended before its time; empty: it did not."""
         return self.reading.ended
 
 
@@ -91,7 +91,7 @@ class Bench(Rig):
     file
         Which devices, on which links.
     operator
-        Who presses; not needed where all devices are emulated.
+        The person who presses; not needed where all devices are emulated.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None) -> None:
@@ -107,9 +107,9 @@ class Bench(Rig):
         Raises
         ------
         RigError
-            If a device is not what the rig file says, or somebody has to press and nobody is there.
+            If a device is not what the rig file says, or no operator is there to press.
         UsageError
-            If the rig file has no entry for the sensor, or says something that a driver does not know.
+            If the rig file has no entry for the sensor, or an option that a driver does not know.
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
@@ -117,41 +117,45 @@ class Bench(Rig):
         with ExitStack() as stack:
             simulated: Acquisition | None = None
             emulators = SceneEmulators(file, self._registry)
-            emulated: EmulatedDevices | None = None
+            clock: Clock = time.monotonic_ns
+            advance, links = None, {}
             if self._physics is not None:
                 simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
             if simulated is not None and file.emulated:
                 emulators.prepare(simulated, sensor, scene, seed)
                 emulated = stack.enter_context(EmulatedDevices(emulators.devices))
-            clock = time.monotonic_ns if emulated is None else emulated.clock
-            links = {} if emulated is None else {name: emulated.opener(name) for name in emulators.devices}
+                clock, advance = emulated.clock, emulated.advance
+                links = {name: emulated.opener(name) for name in emulators.devices}
             drivers = drivers_of(file, self._registry, sensor.name, links, clock)
             for driver in drivers.values():
                 stack.callback(driver.close)
             identity = {name: driver.identify() for name, driver in drivers.items()}
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
             zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
-            self._prompt(force, zero, file, sensor, scene)
-            advance = None if emulated is None else emulated.advance
+            taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
+            profile, duration_s = scene.profile, scene.profile.duration.to("s")
+            text = (
+                f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
+                f"{profile.hold_s:.0f} s, then press slowly to {profile.largest_n:g} N and back, within "
+                f"{duration_s:.0f} s in all."
+            )
+            ask_operator(file, self._operator, "press", text)
             reading = stack.enter_context(
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
             )
-            own = drivers[sensor.name].streams
             emulators.begin(clock() * 1e-9)
             if self._physics is not None:
                 self._physics.begin()
+            drawn: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
+            drawn |= {f"{name} {key}": value for name, about in identity.items() for key, value in about.items()}
             yield BenchAcquisition(
-                streams=own,
+                streams=drivers[sensor.name].streams,
                 reference=() if force is None else force.streams,
-                plan=simulated.plan if simulated is not None else (),
-                assumptions=simulated.assumptions if simulated is not None else {},
-                drawn={
-                    **(simulated.drawn if simulated is not None else {}),
-                    **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                    **({} if force is None else force.about(zero)),
-                },
+                plan=() if simulated is None else simulated.plan,
+                assumptions={} if simulated is None else simulated.assumptions,
+                drawn=drawn if force is None else drawn | force.about(zero),
                 reading=reading,
-                duration_s=scene.profile.duration.to("s"),
+                duration_s=duration_s,
                 force=force,
                 zero=zero,
             )
@@ -170,23 +174,6 @@ class Bench(Rig):
             driver.stop()
         return force.zero(blocks)
 
-    def _prompt(
-        self,
-        force: PressingForce | None,
-        zero: Mapping[str, FloatArray],
-        file: RigFile,
-        sensor: SensorDescriptor,
-        scene: Scene,
-    ) -> None:
-        profile = scene.profile
-        taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
-        text = (
-            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
-            f"{profile.hold_s:.0f} s, then press slowly to {profile.largest_n:g} N and back, within "
-            f"{profile.duration.to('s'):.0f} s in all."
-        )
-        ask_operator(file, self._operator, "press", text)
-
 
 def build(context: RigContext) -> Bench:
     """Return the rig.
@@ -194,7 +181,7 @@ def build(context: RigContext) -> Bench:
     Raises
     ------
     UsageError
-        If there is no rig file, or it names a simulation that is none, or devices that nobody would open.
+        If there is no rig file, or it names a simulation that is none, or devices that the bench does not open.
     """
     if context.rig_file is None:
         raise UsageError(
@@ -203,7 +190,7 @@ def build(context: RigContext) -> Bench:
         )
     if context.rig_file.devices:
         raise UsageError(
-            f"The bench opens no {', '.join(context.rig_file.devices)}: a hand presses, and nothing moves.",
+            f"The bench opens no {', '.join(context.rig_file.devices)}: nothing moves on it.",
             hint="Leave it out under `devices:`, or use the rig parallel-manipulator.",
         )
     return Bench(context.rig_file, context.operator)

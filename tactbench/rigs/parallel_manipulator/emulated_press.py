@@ -1,10 +1,10 @@
-"""The rig's emulated devices: a motor presses the sensor of a simulated scene, force sensor and sensor answer.
+"""The rig's emulated devices: a motor presses the sensor of a simulated scene, force sensor and sensor respond.
 
 Quasi-static. The motor's position gives the depth of the indenter, the simulated rig's press curve the force at that
-depth, and the sensor reads what it read in the simulated recording of the same scene at the moment at which the ramp
-had that force. So what depends on force is exact on a slow ramp, and what depends on time (drift, creep, noise) is that
-of the simulated recording as long as the force keeps to its profile. Left out: the machine's own compliance, the mass
-between motor and force sensor, what a quicker press would do to a skin with memory, anything sideways.
+depth, and the sensor has its reading of the simulated recording of the same scene at the moment at which the ramp had
+that force. So effects of force are exact on a slow ramp, and effects of time (drift, creep, noise) are those of the
+simulated recording as long as the force keeps to its profile. Left out: the machine's own compliance, the mass between
+motor and force sensor, the effect of a quicker press on a skin with memory, all sideways motion.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatedDevice
 
 FORCE = "fz"
-"""Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""
+"""Name of the pressing force in a simulated rig and in emulated force sensors."""
 FLOOR_N = 0.6e-3
-"""Standard deviation of what the force sensor adds by itself (derived: quantisation of a Nano17 read with 16 bits on
-+-10 V, rms of Fz); without it a sensor without noise would seem stuck."""
+"""Standard deviation of the force sensor's own noise (derived: quantisation of a Nano17 read with 16 bits on +-10 V,
+rms of Fz); without it a sensor without noise would seem stuck."""
 BEYOND_M = 1.0
-"""Behind the end of the press curve the skin goes on as a spring, at least as far as any motor goes."""
+"""Length of the spring behind the end of the press curve, at least the travel of any motor."""
 _FLOOR_DRAWS = 1 << 14
 _FLOOR_HZ = 7000
 """A new draw for each sample of a Net F/T box."""
 
 
 def quiet(scene: Scene) -> Scene:
-    """Return the scene as a simulated rig is asked for it: the load follows the profile, the force is not filtered.
+    """Return the scene for the simulated rig: the load follows the profile, the force is not filtered.
 
     Raises
     ------
@@ -105,11 +105,12 @@ class EmulatedPress:
     def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
         """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
         force_n = self.force_n(position_m)
-        since_s = (t_s - self._start_s) % self._duration_s
+        last_s = self._duration_s - 1e-9  # the sample at the end of the scene is one without load
+        since_s = min((t_s - self._start_s) % self._duration_s, last_s)
         load_n = float(np.interp(since_s, *self._corners))
         noise_n = self._samples(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
-            at_s = min(self._hold_s + force_n * self._s_per_n, self._duration_s - 1e-9)
+            at_s = min(self._hold_s + force_n * self._s_per_n, last_s)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
@@ -117,7 +118,7 @@ class EmulatedPress:
 
 
 class PressEmulators(RigEmulators):
-    """Emulators of a rig file's devices, those of all its sensors: the motor moves, the others sense what it presses.
+    """Emulators of a rig file's devices, those of all its sensors: the motor moves, the others sense its press.
 
     Raises
     ------
@@ -128,7 +129,7 @@ class PressEmulators(RigEmulators):
     def __init__(self, file: RigFile, registry: Any) -> None:
         self._file, self._settings = file, settings_of(file)
         self.press: EmulatedPress | None = None
-        """The scene that is carried out; None: nothing is pressed."""
+        """The present scene; None: nothing is pressed."""
         self.pushed_n = 0.0
         """Force of a push by hand on the force sensor, beside that of the skin."""
         self._motor: Any = None

@@ -1,4 +1,4 @@
-"""A linear delta: its geometry as data, joint values of places and back, and how near it is to singularities.
+"""A linear delta: its geometry as data, joint values of places and back, nearness to singularities, permitted moves.
 
 Leg i stands at azimuth phi_i, with e = (cos phi, sin phi, 0), t = (-sin phi, cos phi, 0), z up. Parallelograms keep the
 platform parallel to its base, so the platform's radius is subtracted from the base's and each leg is one link of length
@@ -22,13 +22,20 @@ Near a singularity, with unit links u_i = (p - c_i)/L_i, all measures without un
 | parallel | links coplanar, or two centres coincide | sigma_U of rows u_i: errors are the joints'/sigma_U |
 | constraint | parallelograms flat, or all links in a plane with z | sigma_W of rows t_i x u_i: the platform can turn |
 
-All derived. Files state mm and deg: this is the border where they become m and rad. Karl et al. 2016 name neither a
-mechanism nor a geometry: that it is a delta is this project's assumption, and so is every number that is shipped.
+A move is permitted if its samples are: reach, joint ranges, assembly mode, distance from singularities. Between samples
+of `SAMPLE_M` a joint may go on by 7 um and sigma fall by 0.005 (at s = 0.15 and L = 250 mm: a joint turns at one place
+at most, and abs(du/dx) <= 1/(s L)); that is left to the limits, which are assumed.
+
+All derived. Files state mm and deg, which become m and rad here. Karl et al. 2016 name neither a mechanism nor a
+geometry: that it is a delta is this project's assumption, and so is every number that is shipped.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -43,10 +50,17 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12
 """Part of a link's length by which it may miss: distances of metres carry errors of a few 1e-16 of themselves, and
 geometry files a few more; three digits are left over."""
-
+SAMPLE_M = 0.2e-3
+"""Distance of samples along a move."""
+WAY_POINT_M = 1e-3
+"""Largest distance of way points: at each all rails come to rest, between them each runs by itself (assumed)."""
+LEAST = 0.15
+"""Of s, sigma_U and sigma_W (assumed: joint speeds and errors grow to at most 7 times)."""
 MODE = -1
 """Sign of det(p - c1, p - c2, p - c3) of a machine whose carriages are ahead; kept along every permitted move."""
 Length = Annotated[float, Field(gt=0, le=1e5)]
+Place = tuple[float, float, float]
+"""x, y, z of the manipulator's point [m]."""
 
 
 def _for_each_leg(value: Any) -> Any:
@@ -66,14 +80,18 @@ class ClosureError(RigError):
     """Joint values at which the three links do not meet, or that fix no place."""
 
 
+class PlaceRefusedError(RigError):
+    """A place or a move is not permitted; nothing has moved."""
+
+
 class LinearDelta(Options):
     """Three carriages on straight rails, vertical or inclined; q is the carriage's way along its rail from A [m]."""
 
     kind: Literal["linear-delta"] = "linear-delta"
     title: str
-    """Shown with what is computed from it; what is shipped is called an example."""
+    """Shown with the results of its kinematics; the shipped one is called an example."""
     source: Source
-    """Where these numbers come from: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
+    """Origin of these numbers: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
     azimuth_deg: PerLeg = (0.0, 120.0, 240.0)
     """Direction of each leg about z."""
     base_radius_mm: PositivePerLeg
@@ -257,3 +275,67 @@ def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
         sideways_rad=np.arcsin(np.minimum(np.abs(_dot(unit, delta.sideways)), 1.0)),
         det=np.linalg.det(unit),
     )
+
+
+# Permitted moves ------------------------------------------------------------------------------------------------------
+
+
+def margins(delta: LinearDelta, p_m: FloatArray) -> dict[str, FloatArray]:
+    """Return by limit the distance to it at (n, 3) places [m], an (n,) each: m, rad or 1; below 0: it is not kept."""
+    q, shortfall = solve_inverse(delta, p_m)
+    found = measures(delta, p_m, q)
+    low, high = delta.joint_range
+    of_legs = {
+        "reach": ROUNDING * delta.link_m - shortfall,
+        "lowest joint value": q - low,
+        "highest joint value": high - q,
+        "s": found.serial - LEAST,
+        "sideways angle": math.radians(delta.sideways_deg) - found.sideways_rad,
+    }
+    return {
+        **{f"{name} of leg {leg + 1}": left[:, leg] for name, left in of_legs.items() for leg in range(3)},
+        "assembly mode": MODE * found.det,
+        "sigma_U": found.parallel - LEAST,
+        "sigma_W": found.constraint - LEAST,
+    }
+
+
+def check_move(delta: LinearDelta, start_m: FloatArray, end_m: FloatArray) -> None:
+    """Raise PlaceRefusedError unless the straight move between places (3,) [m] is permitted.
+
+    Its beginning is not checked: the platform stands there already.
+    """
+    count = max(1, math.ceil(float(np.linalg.norm(end_m - start_m)) / SAMPLE_M))
+    places = start_m + np.arange(1, count + 1)[:, None] / count * (end_m - start_m)
+    for name, left in margins(delta, places).items():
+        if (left < 0).any():
+            place = ", ".join(f"{1e3 * x:.2f}" for x in places[np.argmax(left < 0)])
+            raise PlaceRefusedError(
+                f"({place}) mm is not permitted: the {name} is beyond its limit.",
+                hint="Nothing was moved. Choose another place or another way.",
+            )
+
+
+def way(
+    delta: LinearDelta, here_m: Place, xy_m: tuple[float, float], clearance_m: float, stand_off_m: float
+) -> list[Place]:
+    """Return the places of a way: up to the clearance, sideways there, down to the stand-off above `xy_m`.
+
+    Raises
+    ------
+    PlaceRefusedError
+        If one is not permitted; nothing has moved.
+    """
+    top_m = max(here_m[2], clearance_m)
+    places: list[Place] = [here_m, (*here_m[:2], top_m), (*xy_m, top_m), (*xy_m, stand_off_m)]
+    for start, end in pairwise(places):
+        check_move(delta, np.array(start), np.array(end))
+    return places
+
+
+def way_points(delta: LinearDelta, places: list[Place]) -> Iterator[list[float]]:
+    """Yield the joint values [m] of the way points of a way."""
+    for start, end in pairwise(np.array(place) for place in places):
+        pieces = math.ceil(float(np.linalg.norm(end - start)) / WAY_POINT_M)
+        for n in range(1, pieces + 1):
+            yield inverse(delta, start + n / pieces * (end - start)).tolist()

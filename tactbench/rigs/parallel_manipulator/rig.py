@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, ScenePhysics
 
 STOP_S = 10.0
-"""Added to the time of a retreat (assumed: a control period, and what a guard in another process takes to answer)."""
+"""Added to the time of a retreat (assumed: a control period, and the answer of a guard in another process)."""
 
 
 @dataclass
@@ -77,7 +77,7 @@ class PressAcquisition:
     clock: Clock = field(repr=False)
     duration_s: float
     retreat_s: float
-    """A retreat takes at most."""
+    """Longest time of a retreat."""
     events: list[Event] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -104,9 +104,9 @@ class PressAcquisition:
                 yield self.force.turned(block.rows(slice(first, last)), self.zero)
 
     def stop(self, why: str) -> str:
-        """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
+        """Let the motor retreat at once, and wait for it; return the instruction for the operator if it is not out.
 
-        It retreats already, so a second interrupt changes nothing.
+        A further interrupt changes nothing: the retreat goes on.
         """
         waiting = True
         while waiting:
@@ -118,23 +118,24 @@ class PressAcquisition:
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """What was drawn and achieved: place, touch, events."""
+        """The values drawn and achieved: place, touch, events."""
         press = self.control.press
-        found: dict[str, Scalar] = {
+        events = {
+            f"event {number}": f"{1e-9 * (event.t_ns - self.begin_ns):.3f} s, {event.state}: {event.text}"
+            for number, event in enumerate(self.events, start=1)
+        }
+        return {
             **self.about,
             "press state": str(press.state),
             "touch n": press.touch_n,
             "contact mm": 1e3 * press.contact_m,
             "late control periods": self.control.late,
+            **events,
         }
-        for number, event in enumerate(self.events, start=1):
-            at_s = 1e-9 * (event.t_ns - self.begin_ns)
-            found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
-        return found
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """By stream of the sensor: what became of the scene's rows; those of before and after are not counted."""
+        """The counts of the scene's rows by stream of the sensor; rows before and after it are not counted."""
         found = {}
         for name, one in self.reading.stream_counts.items():
             rows = self._rows.get(name, 0)
@@ -144,20 +145,20 @@ class PressAcquisition:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What drivers and guard have counted."""
+        """The counts of drivers and guard."""
         guard = {f"{name}: {what}": n for name, counts in self.control.counts().items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property
     def ended(self) -> str:
-        """Why it ended before its time; empty: it did not."""
+        """The reason for which it ended before its time; empty: it did not."""
         press, late = self.control.press, self.control.late
-        said = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
-        return "; ".join(filter(None, (said, press.not_out))) or self.reading.ended
+        reason = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
+        return "; ".join(filter(None, (reason, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):
-    """Devices of a rig file, and what presses them together.
+    """Devices of a rig file, and the control that presses with them.
 
     Guard and homes outlive a scene: by the clock the session that keeps them begins with the first scene and ends with
     this object or an error. In virtual time each scene has its own, so that a recording does not depend on those before
@@ -169,14 +170,14 @@ class ParallelManipulator(Rig):
         Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those that `tactbench
         emulate` runs in real time are real ones here.
     operator
-        Who mounts the caps; not needed where all devices are emulated.
+        The person who mounts the caps; not needed where all devices are emulated.
     physics
-        What carries out the scenes that move emulated devices; None: there are none.
+        The simulation of the scenes that move emulated devices; None: there is none.
 
     Raises
     ------
     UsageError
-        If the settings lack something, or contradict each other. What `doctor` refuses is :func:`build`'s business.
+        If the settings lack something, or contradict each other. :func:`build` refuses what `doctor` refuses.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
@@ -202,9 +203,9 @@ class ParallelManipulator(Rig):
         NotApplicable
             If the scene asks for more than a rise of the force from 0, or for a place out of the declared reach.
         RigError
-            If a device is not what the rig file says, nobody is there to mount a cap, or the surface is not found.
+            If a device is not what the rig file says, no operator is there to mount a cap, or the surface is not found.
         UsageError
-            If the rig file has no entry for the sensor, or says something that a driver does not know.
+            If the rig file has no entry for the sensor, or an option that a driver does not know.
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
@@ -251,6 +252,7 @@ class ParallelManipulator(Rig):
     ) -> PressAcquisition:
         """Return the scene, ready to begin; `stack` closes what is its own."""
         settings, guard, clock, profile = self.settings, session.guard, session.clock, scene.profile
+        emulators, facts, placement = session.emulators, self._facts, scene.placement
         ask = partial(ask_operator, with_sensor(self._file, sensor.name), self._operator)
         platform_m = session.travel(xy_m, ask)
         duration_s = profile.duration.to("s")
@@ -263,48 +265,48 @@ class ParallelManipulator(Rig):
         stack.callback(driver.close)
         identity = {**session.identity, sensor.name: driver.identify()}
         force, zero, limits = session.measured_limits()
-        press = Press(settings.press_plan(self._facts.resolution, guard.force_stream), _course(scene))
+        press = Press(settings.press_plan(facts.resolution, guard.force_stream), _course(scene))
         control: Control | None = None
 
         def carry(until_ns: int) -> None:
             if control is not None:
                 control.carry(until_ns)
 
-        virtual = session.emulated is not None
-        reading = stack.enter_context(Reading({sensor.name: driver}, clock=clock, advance=carry if virtual else None))
+        reading = stack.enter_context(
+            Reading({sensor.name: driver}, clock=clock, advance=None if emulators is None else carry)
+        )
 
         def received() -> int:
             return sum(one.received for one in reading.stream_counts.values())
 
-        stack.callback(_disarmed, session)
+        stack.callback(_disarm, session)
         control = Control(
             guard, limits, guard.arm(limits), press, received, clock,
             period_s=1 / settings.force_loop.rate_hz, stale_s=1e-3 * settings.press.stale_ms,
         )  # fmt: skip
         stack.callback(control.stop)
-        if not virtual:
+        if emulators is None:
             control.start()
-        blocks = reading.blocks(math.inf, lambda: press.over)  # a sensor that is silent sends no block to look at
+        blocks = reading.blocks(math.inf, lambda: press.over)  # a silent sensor yields no block
         events = _find_surface(control, blocks)
-        placement, facts = scene.placement, self._facts
-        skin_m = math.nan
-        if session.emulators is not None and session.emulators.press is not None:
-            skin_m = session.emulators.press.skin_m
+        about: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
+        about |= {f"{name} {key}": value for name, values in identity.items() for key, value in values.items()}
+        about |= {
+            **force.about(zero),
+            "force chain": session.checked,
+            "place x mm": placement.x.to("mm"),
+            "place s mm": placement.s.to("mm"),
+        }
+        if platform_m is not None:
+            about["platform mm"] = ", ".join(f"{1e3 * x:.4f}" for x in platform_m)
+        if emulators is not None and emulators.press is not None:
+            about["skin mm"] = 1e3 * emulators.press.skin_m
         found = PressAcquisition(
             streams=driver.streams,
             reference=(*force.streams, guard.motor_stream),
             plan=() if simulated is None else simulated.plan,
             assumptions={} if simulated is None else simulated.assumptions,
-            about={
-                **({} if simulated is None else simulated.drawn),
-                **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                **force.about(zero),
-                "force chain": session.checked,
-                "place x mm": placement.x.to("mm"),
-                "place s mm": placement.s.to("mm"),
-                **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
-                **({} if math.isnan(skin_m) else {"skin mm": 1e3 * skin_m}),
-            },
+            about=about,
             force=force,
             zero=zero,
             control=control,
@@ -315,8 +317,8 @@ class ParallelManipulator(Rig):
             retreat_s=facts.seconds(facts.limits[1] - facts.limits[0], facts.retreat_speed) + STOP_S,
             events=events,
         )
-        if session.emulators is not None:
-            session.emulators.begin(1e-9 * found.begin_ns)
+        if emulators is not None:
+            emulators.begin(1e-9 * found.begin_ns)
         if self._physics is not None:
             self._physics.begin()
         press.begin(1e-9 * found.begin_ns)
@@ -336,7 +338,7 @@ def _course(scene: Scene) -> Course:
 
 
 def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
-    """Let the press find the surface; return what happened meanwhile, whose rows nobody keeps."""
+    """Let the press find the surface, dropping all rows; return the events."""
     press = control.press
     for _ in blocks:
         for _ in control.blocks():
@@ -345,16 +347,16 @@ def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
             break
     events = list(control.events())
     if not press.ready:
-        said = "; ".join(event.text for event in events if event.trigger is not None)
+        reasons = [press.ended or "the sensor has ended", *(one.text for one in events if one.trigger is not None)]
         raise RigError(
-            f"The surface was not found: {press.ended or 'the sensor has ended'}{f' ({said})' if said else ''}.",
+            f"The surface was not found: {'; '.join(reasons)}.",
             hint="Look at the rig: sensor, cap, heights in the rig file.",
         )
     return events
 
 
-def _disarmed(session: Session) -> None:
-    """Let the guard expect no more beats; one that is lost has said so, and has retreated."""
+def _disarm(session: Session) -> None:
+    """Let the guard expect no more beats; a guard that is lost has reported it, and has retreated."""
     with suppress(GuardLostError):
         session.guard.disarm()
     if session.emulators is not None:

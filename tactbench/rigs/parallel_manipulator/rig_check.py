@@ -1,4 +1,4 @@
-"""What a rig file would let this rig do, and why it would be refused; nothing is opened and nothing moves."""
+"""The forces that a rig file permits this rig, and the reasons to refuse it; nothing is opened and nothing moves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import CheckTable, PositionerFacts, RigCheck, RigFile, largest_force_n, read_options
-from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, links, solve_inverse
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, check_move, links, solve_inverse, way
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.settings import (
@@ -24,22 +24,21 @@ from tactbench.rigs.parallel_manipulator.settings import (
     settings_of,
     with_limits,
 )
-from tactbench.rigs.parallel_manipulator.workspace import check_move, way
 
 LOOK_S = 7e-3
-"""A look of the guard, and by how much its scheduling is late: what a reaction has beside the age of the force and the
+"""A look of the guard, and the delay of its scheduling: the part of a reaction beside the age of the force and the
 axis' own latency."""
 INCREMENT_BYTES = 65
-"""Of one increment and the look that confirms its end, and their answers: LA-12345, OK, M, OK, TPOS, -12345, POS,
+"""Bytes of one increment and the polls that confirm its end, and their answers: LA-12345, OK, M, OK, TPOS, -12345, POS,
 -12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
 MOST_OF_LIMIT = 0.5
-"""Part of the largest stable gain that may be used: overshoot, and a skin stiffer than declared, need the rest."""
+"""Largest permitted part of the largest stable gain: overshoot, and a skin stiffer than declared, need the rest."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m", "orientation")
 _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_unit_a")
 
 
 def refuse(file: RigFile) -> None:
-    """Raise UsageError if a rig file is refused for what it says; raises as :func:`check` as well."""
+    """Raise UsageError if a rig file is refused for its contents; raises as :func:`check` as well."""
     problems = check(file).problems
     if problems:
         raise UsageError(
@@ -49,7 +48,7 @@ def refuse(file: RigFile) -> None:
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return what axes, loop and forces come to, and what is refused.
+    """Return the forces of axes and loop, and the problems for which the file is refused.
 
     Raises
     ------
@@ -59,35 +58,33 @@ def check(file: RigFile) -> RigCheck:
     settings, registry = settings_of(file), load_registry()
     file = with_limits(file, settings, registry)
     problems: list[str] = []
-    drive_n: float | None = None
     facts: dict[str, PositionerFacts] = {}
+    most_n: dict[str, float] = {}
     axes: list[tuple[str, ...]] = []
 
     def refusing(do: Callable[[], object]) -> None:
-        """Keep what `do` raises as a problem."""
+        """Keep an error of `do` as a problem."""
         try:
             do()
         except TactbenchError as error:
             problems.append(str(error))
 
-    most_n: dict[str, float] = {}
     for name in axes_of(settings):
         kind, given = positioner_of(registry, name, file.devices[name])
         options = read_options(kind.options_kind, given, name)
-        drive_n = options.largest_force_n if name == MOTOR else drive_n
+        most_n[name] = math.inf if options.largest_force_n is None else options.largest_force_n
+        of_axis = _axis_problems(settings, name, options)
         try:
             facts[name] = kind.facts_of(options)
         except RigError as error:
-            said = " ".join([f"{name}: {error.message}", *_axis_problems(settings, name, options)])
-            raise UsageError(said, hint=error.hint) from error
-        problems += _axis_problems(settings, name, options)
+            raise UsageError(" ".join([f"{name}: {error.message}", *of_axis]), hint=error.hint) from error
+        problems += of_axis
         axes.append((name, *_axis_row(options)))
-        most_n[name] = math.nan if options.largest_force_n is None else options.largest_force_n
         if name == MOTOR and isinstance(options, FaulhaberOptions):
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
             problems += _line_problems(settings, options)
-    forces, found = _forces(settings, facts, drive_n)
+    forces, found = _forces(settings, facts, most_n[MOTOR])
     problems += found
     loop = settings.force_loop.model(settings.limits.travel_mm)
     used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
@@ -113,9 +110,9 @@ def check(file: RigFile) -> RigCheck:
 
 
 def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
-    """Raise PlaceRefusedError unless presses at all corners of what may be asked for are permitted.
+    """Raise PlaceRefusedError unless presses at all corners of the reach are permitted.
 
-    With straight rails the permitted places are convex, so the rectangle between the corners is as well.
+    With straight rails the permitted places are convex, so the rectangle between the corners is permitted as well.
     """
     heights, corners = settings.heights, settings.places.corners_m()
     here = (*corners[0], heights.clearance_m)
@@ -125,7 +122,7 @@ def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
 
 
 def _together_n(delta: LinearDelta, settings: RigSettings, most_n: Sequence[float]) -> float:
-    """Return the largest norm of the force that the rails exert on the platform where it may be [N]; NaN: not known.
+    """Return the largest norm of the force that the rails exert on the platform within the reach [N]; NaN: not known.
 
     F = U^T S^-1 f for forces f along the rails (derived: their power is the platform's, U p' = S q'). It is linear in
     f, so the largest is at the ends of all f.
@@ -133,7 +130,7 @@ def _together_n(delta: LinearDelta, settings: RigSettings, most_n: Sequence[floa
     heights = (settings.heights.stand_off_m, settings.heights.clearance_m)
     places_m = np.array([(*corner, height) for corner in settings.places.corners_m() for height in heights])
     q, missing = solve_inverse(delta, places_m)
-    if (missing > 0).any():
+    if (missing > 0).any() or not np.isfinite(most_n).all():
         return math.nan
     unit = links(delta, places_m, q)
     per_newton = unit / np.einsum("pij,ij->pi", unit, delta.rail)[..., None]
@@ -153,31 +150,29 @@ def _too_strong(what: str, force_n: float, settings: RigSettings) -> list[str]:
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     force_n: float | None = options.largest_force_n
-    problems: list[str] = []
+    step_m, corridor_m = settings.force_loop.step_m, options.corridor_m
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]
     if force_n is None:
         missing.append("peak_force_n (or peak current and force constant)")
     elif isinstance(options, FaulhaberOptions) and options.current_limit_a is None:
         missing.append("force_constant_n_a, without which the drive is sent no limit for the declared force")
-    if force_n is not None:
-        problems += _too_strong(f"The {name}'s drive", force_n, settings)
+    problems = [] if force_n is None else _too_strong(f"The {name}'s drive", force_n, settings)
     if missing:
         problems.append(f"The options of {name} lack {', '.join(missing)}; nothing moves without.")
-    if name == MOTOR and options.homes_towards() > 0:
-        problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s negative.")
-    if name in JOINTS and options.homes_towards() < 0:
-        problems.append(f"The {name} is homed downwards, towards the skin. Make homing_speed_m_s positive.")
-    if name == MOTOR and options.corridor_m is not None and options.corridor_m > settings.force_loop.step_m:
+    skin, away = (1, "negative") if name == MOTOR else (-1, "positive")
+    if options.homes_towards() == skin:
+        problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s {away}.")
+    if name == MOTOR and corridor_m is not None and corridor_m > step_m:
         problems.append(
-            f"The motor calls a move ended within {1e6 * options.corridor_m:g} um, and the largest increment is "
-            f"{1e6 * settings.force_loop.step_m:g} um. Lower corridor_m, or raise the loop's speed."
+            f"The motor's moves end within {1e6 * corridor_m:g} um, and the largest increment is {1e6 * step_m:g} um. "
+            "Lower corridor_m, or raise the loop's speed."
         )
     return problems
 
 
 def _axis_row(options: Any) -> tuple[str, ...]:
-    """Return how an axis stands, its largest force, and which units nobody has stated."""
+    """Return an axis' orientation, its largest force with the source, and the units that the file does not state."""
     force_n = options.largest_force_n
     without = "holds without power" if options.holds_unpowered else "FALLS without power: it stays powered"
     assumed = [name for name in _UNITS if name in type(options).model_fields and name not in options.model_fields_set]
@@ -190,7 +185,7 @@ def _axis_row(options: Any) -> tuple[str, ...]:
 
 
 def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str]:
-    """Return what is wrong if an increment takes longer on the line than the loop is computed with."""
+    """Return the problem if an increment takes longer on the line than the loop is computed with."""
     loop, exchange_ms = settings.force_loop, 1e3 * line_time_s(INCREMENT_BYTES, options.baud)
     allowed_ms = 1e3 / loop.rate_hz + loop.delay_ms
     if exchange_ms <= allowed_ms:
@@ -202,9 +197,9 @@ def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str
 
 
 def _forces(
-    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float | None
+    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float
 ) -> tuple[list[tuple[str, str]], list[str]]:
-    """Return how large the force may become, and what is wrong if that is more than is rated or allowed.
+    """Return the largest forces by situation, and a problem for each above the rated or allowed one.
 
     A reaction is as late as the rig file allows: the force has the largest age that the guard accepts.
     """
@@ -232,7 +227,6 @@ def _forces(
         settings.found_m - settings.surface_m + 1e-3 * settings.heights.tolerance_mm,
         2 * settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
     )
-    lying = min(by_approach + k * way_m, drive_n or float("inf"))
     rows = [
         (
             "reaction",
@@ -243,7 +237,7 @@ def _forces(
         ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
         (
             "where the force sensor ceases to answer",
-            f"{lying:.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
+            f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
         ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
         ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),

@@ -1,4 +1,4 @@
-"""What outlives a scene: the guard with all axes, homed once, and the emulated devices in virtual time."""
+"""The parts of the rig that outlive a scene: the guard with all axes, homed once, and emulated devices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from tactbench.plugin.devices import (
     Beat,
     CommandKind,
     DeviceSettings,
-    Driver,
     EmulatedDevices,
     Guard,
     GuardProcess,
@@ -30,35 +29,39 @@ from tactbench.plugin.devices import (
     drivers_of,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import PressEmulators
-from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, forward
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, Place, forward, way, way_points
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, settings_of, with_limits
-from tactbench.rigs.parallel_manipulator.workspace import Place, way, way_points
 
 if TYPE_CHECKING:
     from tactbench.plugin import Block, FloatArray
     from tactbench.plugin.devices import Clock, Link
 
 CHECK_S = 1.0
-"""For so long the force of a push by hand is averaged."""
+"""Time over which the force of a push by hand is averaged."""
 CHECK_FACTOR = 1.5
-"""By which what is read of it may differ: a hand is no better; a wrong unit is further off (assumed)."""
+"""Largest factor between the push and its reading: a hand is no better; a wrong unit is further off (assumed)."""
 NEAR_M = 0.2e-3
-"""How far the measured place may be from where it was sent (assumed: three rails, each within a drive's corridor)."""
+"""Largest distance of the measured place from its target (assumed: three rails, each within a drive's corridor)."""
 
 
 class Session:
     """Opens all devices but the sensor's, and keeps them until :meth:`close`.
 
-    Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time
-    here: all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their
-    home as long as drive and session live.
+    Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time,
+    all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their home as
+    long as drive and session live.
 
     Parameters
     ----------
     file
-        The rig file; of its sensors all have their emulators here.
+        The rig file; each of its sensors that is emulated has its emulator here.
     registry
         Of the devices.
+
+    Attributes
+    ----------
+    checked
+        The result of the check of the force chain; empty: not yet made.
 
     Raises
     ------
@@ -72,7 +75,6 @@ class Session:
         self.emulators: PressEmulators | None = None
         self.emulated: EmulatedDevices | None = None
         self.checked = ""
-        """What became of the check of the force chain; empty: it is still to be made."""
         self.clock: Clock = time.monotonic_ns
         self._links: Mapping[str, Callable[[], Link]] = {}
         self._file = with_limits(file, self.settings, registry).checked_for_one_clock()
@@ -94,7 +96,7 @@ class Session:
 
     def opened(self, sensor: str, *names: str) -> list[Any]:
         """Open drivers of devices by name, with one of the sensors; the caller closes them."""
-        drivers: dict[str, Driver] = drivers_of(self._file, self._registry, sensor, self._links, self.clock, names)
+        drivers = drivers_of(self._file, self._registry, sensor, self._links, self.clock, names)
         return [drivers[name] for name in names]
 
     def _guard(self) -> Guard:
@@ -103,17 +105,18 @@ class Session:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
             return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
         entries: dict[str, Any] = {**self._file.devices, FORCE: self._file.force}
-        *axes, force = (
-            DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
-            for entry in (entries[name] for name in (*names, FORCE))
-        )
+        settings = {}
+        for name in (*names, FORCE):
+            entry = entries[name]
+            settings[name] = DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+        force_settings = settings.pop(FORCE)
         log = str(Path(self.settings.guard_log).expanduser().resolve())
-        return GuardProcess(ProcessSettings(dict(zip(names, axes, strict=True)), force, log))
+        return GuardProcess(ProcessSettings(settings, force_settings, log))
 
-    # A scene's beginning ----------------------------------------------------------------------------------------------
+    # The beginning of a scene -----------------------------------------------------------------------------------------
 
     def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
-        """Take the force sensor's zero, nothing being armed; return it, and what the guard is to keep.
+        """Take the force sensor's zero, nothing being armed; return it, and the limits for the guard.
 
         `confirmed`: whether an operator has seen that the indenter is clear of the sensor.
         """
@@ -142,7 +145,7 @@ class Session:
         return force, {stream.name: zero}, kept
 
     def _fresh(self, seconds: float) -> list[Block]:
-        """Return the force samples that are received in the next seconds, and none from before."""
+        """Return the force samples that are received in the next seconds, without earlier ones."""
         since_ns = self.clock()
         self.guard.advance(since_ns + round(1e9 * seconds))
         return [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks() if block.t_ns is not None]
@@ -150,11 +153,11 @@ class Session:
     def travel(
         self, xy_m: tuple[float, float], ask: Callable[[str, str], bool] = lambda doing, text: False
     ) -> Place | None:
-        """Home what is not homed, and move the platform above a place; return where it is then, None: it is fixed.
+        """Home all axes without a home, and move the platform above a place; return it as measured, None: it is fixed.
 
-        Before, an operator sees that the indenter is clear of the sensor where that is not known, and the force chain
-        is checked once. The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops all
-        rails.
+        Before, an operator confirms that the indenter is clear of the sensor where that is not known, and the force
+        chain is checked once. The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops
+        all rails.
 
         Parameters
         ----------
@@ -189,12 +192,12 @@ class Session:
                 now_ns, kind = self.clock(), CommandKind.TRAVEL if targets else CommandKind.NONE
                 report = guard.beat(Beat(now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets))
                 if report.state is not GuardState.ARMED or (report.reason and not report.early):
-                    said = report.trigger or report.reason
-                    raise RigError(f"The manipulator was stopped on its way: {said}.", hint="See what is in its way.")
+                    reason = report.trigger or report.reason
+                    raise RigError(f"The manipulator was stopped on its way: {reason}.", hint="See what is in its way.")
                 targets = targets if report.early else {}
                 guard.advance(now_ns + round(1e9 / self.settings.force_loop.rate_hz))
         place = _place_m(delta, guard.disarm().positions)
-        off_m = float(np.linalg.norm(np.subtract(place, places[-1])))
+        off_m = math.dist(place, places[-1])
         if not off_m <= NEAR_M:
             raise RigError(
                 f"The platform is {1e3 * off_m:.3f} mm from where it was sent.",
@@ -203,7 +206,7 @@ class Session:
         return place
 
     def _check_force(self, limits: Limits, ask: Callable[[str, str], bool]) -> str:
-        """Let an operator push the force sensor, and return what was read; raises RigError if that is another force."""
+        """Let an operator push the force sensor, and return the reading; raises RigError if it is another force."""
         push_n = self.settings.press.check_n
         if push_n is None:
             return "NOT CHECKED: the rig file has `check_n: null`"
@@ -213,14 +216,15 @@ class Session:
             return "NOT CHECKED: the devices are emulated"
         if self.emulators is not None:
             self.emulators.pushed_n = push_n
-        came = [limits.pressing_n(block.data) for block in self._fresh(CHECK_S)]
-        read_n = float(np.mean(np.concatenate(came))) if came else math.nan
+        pushed = [limits.pressing_n(block.data) for block in self._fresh(CHECK_S)]
+        read_n = float(np.mean(np.concatenate(pushed))) if pushed else math.nan
         if self.emulators is not None:
             self.emulators.pushed_n = 0.0
-        if not push_n / CHECK_FACTOR <= read_n <= push_n * CHECK_FACTOR:
+        least_n, most_n = push_n / CHECK_FACTOR, push_n * CHECK_FACTOR
+        if not least_n <= read_n <= most_n:
             raise RigError(
-                f"The force sensor reads {read_n:+.3g} N of a push of about {push_n:g} N: {push_n / CHECK_FACTOR:.2g} "
-                f"to {push_n * CHECK_FACTOR:.2g} N are expected. Nothing has moved.",
+                f"The force sensor reads {read_n:+.3g} N of a push of about {push_n:g} N: {least_n:.2g} to {most_n:.2g}"
+                " N are expected. Nothing has moved.",
                 hint="Correct `sign:` under `force:` where it falls; else unit, counts or calibration (kgf read 0.10, "
                 "lbf 0.22 of the newtons).",
             )

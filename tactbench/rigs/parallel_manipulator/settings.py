@@ -1,7 +1,6 @@
-"""What a rig file says under `settings:` of this rig, checked: nothing is moved by a file that lacks a limit.
+"""The `settings:` of this rig in a rig file, checked: nothing is moved by a file that lacks a limit.
 
-Plain numbers, each with its unit in its name; here is the border where they become SI. Positions of the motor are
-positive into the skin.
+Plain numbers, each with its unit in its name, which become SI here. Positions of the motor are positive into the skin.
 """
 
 from __future__ import annotations
@@ -34,68 +33,68 @@ BEATS = 3
 LEAST_HEARTBEAT_S = 0.02
 """Shorter limits trip falsely: sleeps on an ordinary kernel are late by up to 9.4 ms (measured)."""
 WINDUP_S = 0.2
-"""Times the loop's speed is how far its target may be ahead of the measured position (assumed)."""
+"""Times the loop's speed: the distance by which its target may be ahead of the measured position (assumed)."""
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Range = tuple[float, float]
 
 
-def _rising(*numbers: float, said: str) -> None:
+def _rising(names: str, *numbers: float) -> None:
     """Raise ValueError unless no number is below the one before."""
     if list(numbers) != sorted(numbers):
-        raise ValueError(f"{said} do not rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
+        raise ValueError(f"{names} do not rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
 
 
 class SafetyLimits(Options):
-    """What is never exceeded."""
+    """Limits that are never exceeded."""
 
     force_ceiling_n: Positive
     """Norm of the raw force, in one sample, at which the motor retreats while it presses."""
     travel_ceiling_n: Positive = 0.2
-    """The same while the manipulator moves, and while anything is homed or retracted: above noise and drift, well below
+    """The same while the manipulator moves, and while any axis is homed or retracted: above noise and drift, well below
     a press (assumed)."""
     torque_ceiling_nm: Positive | None = None
-    """Norm of the raw torque; None: torque is not looked at."""
+    """Norm of the raw torque; None: torque is not limited."""
     rated_force_n: Positive
-    """What the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
+    """Load that the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
     force_age_ms: Positive = 30.0
-    """How old a sample of the force may be: three sampling periods of the force sensor, and by how much sender and
-    host are late (assumed: of 250 Hz or more, and an ordinary kernel)."""
+    """Largest age of a sample of the force: three sampling periods of the force sensor, and the delays of sender and
+    host (assumed: 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
     """Least and greatest position of the motor; between them lies the 0 of a Faulhaber drive."""
     heartbeat_ms: Positive
-    """The motor retreats if nobody has told it for so long to go on."""
+    """Time without a beat of the rig after which the motor retreats."""
     retreat_mm: float
-    """Position of the motor away from the skin: where it waits, and where it goes whatever is wrong."""
+    """Position of the motor away from the skin, where it waits and to which it retreats."""
     retreat_speed_mm_s: Positive
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         low, high = self.travel_mm
-        _rising(low, self.retreat_mm, high, said="the motor's travel and its place of retreat")
+        _rising("the motor's travel and its place of retreat", low, self.retreat_mm, high)
         ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
-        _rising(*ceilings, said="ceiling of travel, ceiling of pressing and rated force")
+        _rising("ceiling of travel, ceiling of pressing and rated force", *ceilings)
         return self
 
 
 class Stiffness(Options):
-    """How stiff skin, cap and machine in series are, N/mm; declared, since nobody can compute it beforehand."""
+    """Stiffness of skin, cap and machine in series, N/mm; declared, since it cannot be computed beforehand."""
 
     softest_n_mm: Positive
-    """The least of any skin and cap, from the first touch on: force per way from any place to any deeper one. The less,
-    the later a force that does not answer is noticed; more than a skin has: its presses are ended."""
+    """The least of any skin and cap, from the first touch on: force per way from any place to any deeper one. The lower
+    it is, the later a force sensor that does not respond is noticed; above a skin's own, its presses are ended."""
     at_touch_n_mm: Positive
     """The greatest up to the force that a first touch may have."""
     greatest_n_mm: Positive
-    """At the largest commanded force on the stiffest cap: what the loop must settle at."""
+    """At the largest commanded force on the stiffest cap, where the loop must settle."""
     at_ceiling_n_mm: Positive
-    """At the ceiling: what a reaction that comes late costs."""
+    """At the ceiling, where a late reaction adds force."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        rising = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
-        _rising(*rising, said="the softest, at a touch, greatest, at the ceiling")
+        stiffnesses = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
+        _rising("stiffness of the softest skin, at a touch, greatest, at the ceiling", *stiffnesses)
         return self
 
 
@@ -103,17 +102,17 @@ class ForceControl(Options):
     """The force loop."""
 
     rate_hz: Positive
-    """Control periods a second; each is a beat for the guard."""
+    """Control periods a second, each with a beat for the guard."""
     proportional_mm_n: NotNegative = 0.0
     integral_mm_n_s: Positive
     cutoff_hz: Positive | None
     """Of the first-order low-pass on the regulated force; null: unfiltered."""
     delay_ms: NotNegative
-    """From a force sample to the drive's having the command: line time, answers, a control period's phase."""
+    """From a force sample to the drive's receipt of the command: line time, answers, a control period's phase."""
     motor_lag_ms: NotNegative
     """Time constant of the drive's position loop."""
     speed_mm_s: Positive
-    """Largest speed of the loop: 2 to 5 times what the ramp needs at the softest place."""
+    """Largest speed of the loop: 2 to 5 times that of the ramp at the softest place."""
     feed_forward_n_mm: Positive | None = None
     """Assumed stiffness for the ramp's feed-forward; null: none."""
 
@@ -141,7 +140,7 @@ class ForceControl(Options):
 
 
 class Touch(Options):
-    """How the surface is found; see :class:`PressPlan`."""
+    """The search for the surface; see :class:`PressPlan`."""
 
     speed_mm_s: Positive
     """On the way to the expected surface, out of its reach."""
@@ -152,36 +151,36 @@ class Touch(Options):
     single_n: Positive
     """A touch: two of three raw samples above it. Well above the force sensor's noise."""
     mean_n: Positive
-    """A touch as well: the mean of the newest raw samples, as many as come in `mean_ms`, above it. Also the largest
-    mean without touch: before the surface, after lifting off, and at the place of retreat."""
+    """A touch as well: the mean of the raw samples of the last `mean_ms` above it. Also the largest mean without touch:
+    before the surface, after lifting off, and at the place of retreat."""
     mean_ms: Positive
-    """One control period or more; the noise of a mean falls with its root."""
+    """One control period or more; the noise of a mean falls with its square root."""
     allowed_n: Positive
     """The largest force of a first touch that is acceptable."""
     contact_n: Positive
-    """The force that is kept after the touch, until the place of the surface is known; and the least on the ramp."""
+    """Force that is kept after the touch, until the place of the surface is known; and the least on the ramp."""
     settle_s: Positive
-    """How long."""
+    """Time for which it is kept."""
     lift_mm: Positive
-    """How far the motor goes back from that place for the unloaded hold."""
+    """Distance of the motor from that place during the unloaded hold."""
 
 
 class PressRules(Options):
-    """What ends a press before its time, and how it ends; see :class:`PressPlan`."""
+    """The end of a press, also before its time; see :class:`PressPlan`."""
 
     error_band_n: Positive
-    """Filtered force this far from the wanted one for a second: retreat."""
+    """Largest distance of the filtered force from the setpoint; above it for a second, the motor retreats."""
     unload_speed_mm_s: Positive
     """After the scene's ramp."""
     check_n: Positive | None = 3.0
     """Push by hand, or weight, with which an operator loads the force sensor before the first press of a session: it
-    must be read with its sign, and within a factor of 1.5. null: not checked, which recordings say."""
+    must be read with its sign, and within a factor of 1.5. null: not checked, as recordings state."""
     stale_ms: Positive = 100.0
-    """The sensor's rows may be this old, as received; older: retreat."""
+    """Largest time without a row of the sensor; after it, the motor retreats."""
 
 
 class Heights(Options):
-    """Where the sensor's surface is expected below the indenter.
+    """Expected height of the sensor's surface below the indenter.
 
     Heights are those of the manipulator's point at which the tip of the retracted indenter would have that height.
     """
@@ -189,17 +188,17 @@ class Heights(Options):
     surface_mm: float
     """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
     tolerance_mm: NotNegative
-    """How far the surface may be from there: three times its spread, and what caps differ in length."""
+    """Largest distance of the surface from there: three times its spread, and the differences of the caps' lengths."""
     stand_off_mm: Positive
     """Between tip and expected surface before the motor approaches."""
     clearance_mm: Positive
     """Between tip and expected surface on sideways moves."""
     depth_mm: Positive
-    """How far below the expected surface the motor may go."""
+    """Greatest depth of the motor below the expected surface."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        _rising(self.tolerance_mm, self.stand_off_mm, self.clearance_mm, said="tolerance, stand-off and clearance")
+        _rising("tolerance, stand-off and clearance", self.tolerance_mm, self.stand_off_mm, self.clearance_mm)
         return self
 
     @property
@@ -214,7 +213,7 @@ class Heights(Options):
 
 
 class Places(Options):
-    """Where the manipulator goes for a scene: the sensor's nominal contact point and the scene's offset from it."""
+    """The manipulator's place for a scene: the sensor's nominal contact point and the scene's offset from it."""
 
     x_mm: float = 0.0
     """Manipulator's x with the indenter above the nominal contact point."""
@@ -234,17 +233,17 @@ class Places(Options):
         return 1e-3 * x, 1e-3 * y
 
     def corners_m(self) -> list[tuple[float, float]]:
-        """Return the four corners of all that may be asked for, in turn [m]."""
+        """Return the four corners of the reach, in turn [m]."""
         (x0, x1), (s0, s1) = self.reach_x_mm, self.reach_s_mm
         return [self.place_m(*at) for at in ((x0, s0), (x1, s0), (x1, s1), (x0, s1))]
 
 
 class RigSettings(Options):
-    """All that this rig is told beside its devices."""
+    """All settings of this rig beside its devices."""
 
     limits: SafetyLimits
     manipulator: Literal["fixed"] | LinearDelta
-    """`fixed`: somebody puts the sensor below the indenter, and nothing but the motor moves."""
+    """`fixed`: the sensor is put below the indenter by hand, and only the motor moves."""
     heights: Heights
     places: Places = Places()
     stiffness: Stiffness
@@ -252,24 +251,25 @@ class RigSettings(Options):
     touch: Touch
     press: PressRules
     guard_log: str = "tactbench-guard.log"
-    """File to which the guard's process adds a line an event, also when the rig's own process is lost."""
+    """File to which the guard's process appends a line for each event, also when the rig's own process is lost."""
 
     @model_validator(mode="after")
     def _together(self) -> Self:
         limits, loop, touch, heights = self.limits, self.force_loop, self.touch, self.heights
         least_ms = 1e3 * max(BEATS / loop.rate_hz, LEAST_HEARTBEAT_S)
         deepest_mm = limits.retreat_mm + heights.stand_off_mm + heights.depth_mm
-        _rising(least_ms, limits.heartbeat_ms, said="three control periods (20 ms at least) and the heartbeat")
-        _rising(1e3 / loop.rate_hz, touch.mean_ms, said="a control period and the time of a touch's mean")
-        _rising(touch.contact_n, touch.mean_n, said="the force kept after a touch and that of a touch")
-        _rising(touch.single_n, limits.force_ceiling_n, said="a touch in a single sample and the ceiling")
-        _rising(touch.touch_speed_mm_s, touch.speed_mm_s, said="the speed of the touch and of the way to it")
-        _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
-        _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
         found_mm = 1e3 * (self.found_m - self.surface_m)
-        _rising(
-            found_mm, heights.depth_mm, said="where the softest skin is touched (mean_n/softest_n_mm) and the depth"
-        )
+        for names, *numbers in (
+            ("three control periods (20 ms at least) and the heartbeat", least_ms, limits.heartbeat_ms),
+            ("a control period and the time of a touch's mean", 1e3 / loop.rate_hz, touch.mean_ms),
+            ("the force kept after a touch and that of a touch", touch.contact_n, touch.mean_n),
+            ("a touch in a single sample and the ceiling", touch.single_n, limits.force_ceiling_n),
+            ("the speed of the touch and of the way to it", touch.touch_speed_mm_s, touch.speed_mm_s),
+            ("lift and stand-off", touch.lift_mm, heights.stand_off_mm),
+            ("retreat, stand-off and depth together, and the motor's travel", deepest_mm, limits.travel_mm[1]),
+            ("where the softest skin is touched (mean_n/softest_n_mm) and the depth", found_mm, heights.depth_mm),
+        ):
+            _rising(names, *numbers)
         return self
 
     @property
@@ -285,7 +285,7 @@ class RigSettings(Options):
 
     @property
     def deepest_m(self) -> float:
-        """The greatest position that is ever asked for [m]."""
+        """The greatest commanded position [m]."""
         return self.surface_m + 1e-3 * self.heights.depth_mm
 
     @property
@@ -295,7 +295,7 @@ class RigSettings(Options):
 
     @property
     def found_m(self) -> float:
-        """Position of the motor at which the surface must have been touched [m]: a mean is behind by its time."""
+        """Position of the motor at which the surface must have been touched [m]: a mean lags by its time."""
         behind_m = 1e-6 * self.touch.touch_speed_mm_s * self.touch.mean_ms
         return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m + behind_m
 
@@ -323,7 +323,7 @@ class RigSettings(Options):
 
 
 class ManipulatorFile(RigFile):
-    """A rig file of this rig: complaints about its settings name their line."""
+    """A rig file of this rig: errors in its settings name their line."""
 
     settings: RigSettings  # type: ignore[assignment]
 
@@ -357,7 +357,7 @@ def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Po
 
 
 def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
-    """Return the file with the motor told the limits of the settings; raises UsageError if it was told some itself."""
+    """Return the file with the settings' limits among the motor's options; raises UsageError if those state any."""
     limits = settings.limits
     own = {
         "lower_m": 1e-3 * limits.travel_mm[0],
@@ -374,7 +374,7 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
     if twice := [name for name in own if name in entry.options]:
         raise UsageError(
             f"The motor's {', '.join(twice)} is stated among its options.",
-            hint="The rig's limits say it: state it once, under `settings: limits:` and `touch:`.",
+            hint="State it once, under `settings: limits:` and `touch:`.",
         )
     read_options(kind.options_kind, {**options, **own}, entry.device)
     motor = entry.model_copy(update={"options": {**entry.options, **own}})

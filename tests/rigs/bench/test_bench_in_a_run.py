@@ -22,11 +22,9 @@ def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
     (shell.folder / "rig.yaml").write_text(text, encoding="utf-8")
     verbs("run", "--sensor", "icub", *asked)
     # Without --sensor it is that of the rig file.
-    out = verbs("run", "--rig-file", "rig.yaml", *asked).stdout
-    assert "EMULATED devices (rig bench)" in out
+    assert "EMULATED" in verbs("run", "--rig-file", "rig.yaml", *asked).stdout
     table = verbs("leaderboard", "--format", "md").stdout
-    assert table.count("EMULATED devices (rig bench)") == 1
-    assert table.count("SIMULATED: no sensor was touched") == 1
+    assert (table.count("EMULATED"), table.count("SIMULATED")) == (1, 1)
     rows = json.loads(verbs("leaderboard", "--format", "json").stdout)
     score = {row["rig"]: row["score"] for row in rows if row["estimator"] == "ols"}
     # One campaign of each, of the same samples; what differs is the zero of the force, some hundredths of a newton.
@@ -36,20 +34,20 @@ def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
         "twin": (True, False),
     }
     again = shell("run", "--rig-file", "rig.yaml", *asked)
-    assert "0 recordings made now" in again.stderr
+    assert "0 recordings" in again.stderr
 
 
 def test_a_rig_file_for_another_rig_or_none_at_all_is_refused(verbs):
     assert "--rig-file" in verbs("run", "--rig", "bench", "--sensor", "icub", "--task", "force", code=2).stderr
     refused = verbs("run", "--rig", "twin", "--rig-file", str(EXAMPLE), "--sensor", "icub", code=2).stderr
-    assert "for the rig 'bench'" in refused
+    assert "'bench'" in refused
 
 
 def test_one_scene_is_recorded_and_a_terminal_is_asked_for_where_somebody_has_to_press(shell):
     made = shell(
         "record", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--profile", "ramp:duration=2", "--out", "press.h5"
     )
-    assert "icub on bench (EMULATED)" in made.stdout
+    assert "(EMULATED)" in made.stdout
     text = EXAMPLE.read_text().replace("link: emulated", "link: udp://127.0.0.1:9", 1)
     (shell.folder / "rig.yaml").write_text(text)
     refused = shell("record", "--rig-file", "rig.yaml", "--sensor", "biotac", "--out", "none.h5", code=None)
@@ -58,9 +56,8 @@ def test_one_scene_is_recorded_and_a_terminal_is_asked_for_where_somebody_has_to
     assert not (shell.folder / "none.h5").exists()
 
 
-def test_what_a_rig_cannot_answer_is_said_before_anything_is_recorded(shell):
-    asked = ("run", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--task")
+def test_a_task_that_the_rig_has_no_reference_for_is_refused_before_anything_is_recorded(verbs, shell):
     for task, lacking in (("contact-location", "position x"), ("slip", "position slip")):
-        done = shell(*asked, task, code=2)
-        assert f"asks for {lacking}; the rig bench records none" in done.stderr
+        refused = verbs("run", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--task", task, code=2)
+        assert lacking in refused.stderr
     assert not list(shell.folder.rglob("*.h5"))

@@ -1,12 +1,8 @@
-"""Emulators behind links: in virtual time, and on real sockets and pseudo-terminals in threads."""
+"""Emulators behind links in virtual time."""
 
 from __future__ import annotations
 
-import socket
-import threading
-import time
 from collections import deque
-from contextlib import contextmanager
 
 import numpy as np
 
@@ -76,65 +72,15 @@ class VirtualLink(ByteLink, DatagramLink):
 
 
 def read_for(driver, link, seconds):
-    """Return one block of what comes in some time."""
+    """Return one block of all rows of some time."""
     blocks, end_ns = [], link.clock() + round(1e9 * seconds)
     while link.clock() < end_ns:
         blocks += driver.read((end_ns - link.clock()) / 1e9)
-    return joined(blocks)
-
-
-def joined(blocks):
-    def all_of(name):
-        parts = [getattr(block, name) for block in blocks]
-        return None if parts[0] is None else np.concatenate(parts)
-
     marks = [np.zeros(b.data.shape, np.uint8) if b.quality is None else b.quality for b in blocks]
+
+    def joined(name):
+        return np.concatenate([getattr(block, name) for block in blocks])
+
     return Block(
-        stream=blocks[0].stream,
-        t_ns=all_of("t_ns"),
-        data=all_of("data"),
-        quality=np.concatenate(marks),
-        sequence=all_of("sequence"),
-        device_ns=all_of("device_ns"),
+        blocks[0].stream, joined("t_ns"), joined("data"), np.concatenate(marks), joined("sequence"), joined("device_ns")
     )
-
-
-@contextmanager
-def in_thread(serve):
-    """Run `serve(ended)` in a thread; on leaving set the event and wait for it."""
-    ended = threading.Event()
-    thread = threading.Thread(target=serve, args=[ended])
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join(10.0)
-        assert not thread.is_alive()
-
-
-# How long an end of a service is waited for; also what bounds a wait whose next event is far.
-LONGEST_WAIT_S = 0.02
-
-
-@contextmanager
-def on_udp(emulator):
-    """Serve an emulator on loopback UDP in real time; yields its port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
-        own.bind(("127.0.0.1", 0))
-
-        def serve(ended):
-            host = None
-            while not ended.is_set():
-                # A time-out of zero would not block at all.
-                own.settimeout(min(max(emulator.next_s() - time.monotonic(), 1e-4), LONGEST_WAIT_S))
-                try:
-                    datagram, host = own.recvfrom(2048)
-                    sent = emulator.feed(datagram, time.monotonic())
-                except TimeoutError:
-                    sent = emulator.poll(time.monotonic())
-                for _, answer in sent:
-                    own.sendto(answer, host)
-
-        with in_thread(serve):
-            yield own.getsockname()[1]

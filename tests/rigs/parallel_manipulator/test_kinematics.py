@@ -90,15 +90,15 @@ def test_whatever_is_asked_nothing_is_nan_and_links_keep_their_length(a, b, c, d
 
 
 def test_a_place_out_of_reach_names_leg_and_shortfall():
-    with pytest.raises(UnreachableError, match=r"Leg 2 of .* misses the place \(200\.000, 0\.000, -150\.000\) mm"):
+    with pytest.raises(UnreachableError, match=r"Leg 2 .*\(200\.000,"):
         inverse(LV, np.array([0.2, 0.0, -0.15]))
 
 
 def test_joint_values_without_a_place_are_refused():
-    with pytest.raises(ClosureError, match=r"do not meet .* are missing"):
+    with pytest.raises(ClosureError, match="meet"):
         forward(LV, np.array([0.0, 0.0, 0.6]))
     coincident = LV.model_copy(update={"base_radius_mm": (30.0,) * 3})
-    with pytest.raises(ClosureError, match="in one line"):
+    with pytest.raises(ClosureError, match="line"):
         forward(LinearDelta.model_validate(coincident.model_dump()), np.zeros(3))
 
 
@@ -113,9 +113,9 @@ def test_what_is_not_a_place_is_refused(bad):
     ("changed", "said"),
     [
         ({"azimuth_deg": (0.0, 0.5, 240.0)}, "same azimuth"),
-        ({"joint_lowest_mm": 300.0}, "not below its highest"),
-        ({"link_mm": 0.0}, "greater than 0"),
-        ({"arm_mm": 1.0}, "Extra inputs"),
+        ({"joint_lowest_mm": 300.0}, "lowest"),
+        ({"link_mm": 0.0}, "link_mm"),
+        ({"arm_mm": 1.0}, "arm_mm"),
     ],
 )
 def test_a_geometry_that_cannot_be_is_refused(changed, said):

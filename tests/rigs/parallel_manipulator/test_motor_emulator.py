@@ -58,23 +58,18 @@ class Host:
             assert self.ask(text) == "OK", text
 
 
-SENT = [row for row in ANSWERED_OK if row[2].name not in ("LR", "NP", "NPOFF")]
-"""What a driver sends."""
-
-
-@pytest.mark.parametrize(("text", "sent", "command"), SENT, ids=[row[0] for row in SENT])
-def test_ok(text, sent, command):
+@pytest.mark.parametrize("sent", ANSWERED_OK)
+def test_ok(sent):
     host = Host()
     host.do("EN")
-    assert host.lines(bytes.fromhex(sent).decode())[0] == Line(Kind.OK, "OK")
+    assert host.lines(sent.decode() + "\r")[0] == Line(Kind.OK, "OK")
 
 
 @pytest.mark.parametrize(
     ("before", "asked", "answer"),
     [
         (["HO98956"], "POS", "98956"),
-        (["HO-1500"], "POS", "-1500"),
-        (["HO98956"], "pos", "98956"),
+        (["HO-1500"], "pos", "-1500"),
         (["EN"], "OST", "65536"),
         (["EN", "APL1"], "CST", "9220"),
         ([], "XYZ", "Unknown command"),

@@ -105,7 +105,7 @@ def test_contact_that_is_lost_ends_the_press():
         plant.go()
     plant.skin_m += 1e-3
     plant.until(PressState.FAILED)
-    assert "contact is lost" in plant.press.ended
+    assert "softest" in plant.press.ended
     assert plant.largest_n < 1.5
 
 
@@ -116,7 +116,7 @@ def test_a_force_far_from_the_wanted_one_ends_the_press_within_a_second():
     plant.force_gain, plant.force_offset_n = 0.0, 6.0  # it does not answer any more
     began_s = plant.now_s
     plant.until(PressState.FAILED, seconds=3.0)
-    assert "more than on the stiffest declared skin" in plant.press.ended
+    assert "stiffest" in plant.press.ended
     # The filter of 2 Hz needs a moment to come so far.
     assert plant.now_s - began_s < 1.5
 
@@ -127,14 +127,14 @@ def test_a_loop_that_swings_ends_the_press():
                                    settings__press__error_band_n=0.3))  # fmt: skip
     plant = Plant(settings).begun().until(PressState.FAILED)
     # Which comes first depends on where the swing has found the surface.
-    assert re.search("off by more than|contact is lost", plant.press.ended)
+    assert re.search("off by|softest", plant.press.ended)
 
 
 def test_no_contact_down_to_the_depth_ends_the_press():
     plant = Plant()
     plant.skin_m = 1.0
     plant.until(PressState.FAILED)
-    assert plant.press.ended.startswith("no touch down to")
+    assert plant.press.ended.startswith("no touch")
     assert plant.position_m <= SETTINGS.found_m
 
 

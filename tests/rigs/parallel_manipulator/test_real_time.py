@@ -27,8 +27,9 @@ def impatient(tmp_path):
     said["allowed"] = {"lost_percent": 100.0}
     said["force"] |= {"zero_s": 0.3, "range_n": 200.0}  # a short zero of the twin's noise drifts
     settings["limits"] |= {"force_age_ms": 1000.0, "heartbeat_ms": 2000.0, "rated_force_n": 2000.0}
+    settings["force_loop"]["speed_mm_s"] = 2.0
     # After a zero that is so short, the twin's noise alone is a touch of 0.6 N at times.
-    settings["touch"] |= {"settle_s": 0.3, "lift_mm": 0.3, "allowed_n": 10.0, "mean_n": 1.5}
+    settings["touch"] |= {"touch_speed_mm_s": 2.0, "settle_s": 0.3, "lift_mm": 0.3, "allowed_n": 50.0, "mean_n": 1.5}
     settings["press"] |= {"stale_ms": 3000.0, "error_band_n": 6.0}
     settings["guard_log"] = str(tmp_path / "guard.log")
     for name in JOINTS:
@@ -38,7 +39,7 @@ def impatient(tmp_path):
 
 def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_home(tmp_path):
     """The sender of the force was a thread of the rig's process, which held it up for longer than the guard allows."""
-    icub, described, scene = REGISTRY.sensors["icub"], REGISTRY.rigs["parallel-manipulator"], ramp(5.0, 0.5, 5.0)
+    icub, described, scene = REGISTRY.sensors["icub"], REGISTRY.rigs["parallel-manipulator"], ramp(2.5, 0.2, 2.0)
     with emulating(impatient(tmp_path), tmp_path) as file:
         rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=file))
         for name in ("a.h5", "b.h5"):
@@ -57,7 +58,7 @@ def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_ho
     assert meta.assumptions["noise_scale"] == 1.0  # what the simulation said in its own process
     # It was pressed, the motor's way came back as force, and the sensor answered to it.
     at_s = 1e-9 * (force.t_ns - force.t_ns[0])
-    assert force.data[at_s > 4.5, 2].mean() > force.data[at_s < 0.5, 2].mean() + 1.5
+    assert force.data[at_s > 1.7, 2].mean() > force.data[at_s < 0.2, 2].mean() + 0.7
     assert abs(taxels.data[-10:].mean(axis=0) - taxels.data[:10].mean(axis=0)).max() > 5
     said = (tmp_path / "guard.log").read_text(encoding="utf-8")
     assert (said.count('"homing motor"'), said.count('"armed"}')) == (1, 4)

@@ -3,8 +3,8 @@
 A command is ``NAME[argument]`` and CR; an answer is a line that ends with CR LF and names no command (sourced:
 Faulhaber manual MCBL 3564K024B CS, chapter 5, published at manualshive.com). Between a command and its answer the drive
 may put notices: single letters on a line of their own. The protocol has no checksum: a digit that becomes another digit
-on the line is not noticed by anybody, so what matters (limits, position before a move) must be read twice.
-What the integers mean is in ``profile.py``.
+on the line cannot be detected, so that limits, and the position before a move, must be read twice.
+The units of the integers are in ``profile.py``.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def encode(name: str, argument: int | None = None) -> bytes:
 
 
 _COMMAND = re.compile(r"[0-9]{0,3}([A-Z]+)([+-]?[0-9]{1,19})?", re.ASCII)
-"""Before the name the address of a drive on a line with several: there is one here, so it is not looked at."""
+"""Before the name the address of a drive on a line with several: there is one here, so the address is ignored."""
 
 
 class CommandReader:
@@ -77,13 +77,13 @@ class CommandReader:
 
 
 class Kind(Enum):
-    """What a line from the drive is."""
+    """Kinds of lines from the drive."""
 
     OK = "ok"
     VALUE = "value"
     """An integer, or the 0s and 1s of GST and GFS."""
     TEXT = "text"
-    """Anything else that can be printed."""
+    """Any other printable text."""
     REFUSAL = "refusal"
     NOTICE = "notice"
     """Sent by the drive itself; never the answer to a command."""
@@ -97,7 +97,7 @@ class Line(NamedTuple):
     kind: Kind
     text: str
     t_ns: int = 0
-    """When its first byte was in the host."""
+    """Time of receipt of its first byte."""
 
     def answers(self, name: str) -> bool:
         """Return whether it may be the answer to a command; a refusal answers any.
@@ -150,7 +150,7 @@ class LineReader:
         found = [_read_line(raw, t_ns if number else self._began_ns) for number, raw in enumerate(ended)]
         if ended:
             self._began_ns = t_ns
-        # One byte more than allowed is kept, so that an overlong line is known as such.
+        # One byte more than allowed is kept, so that an overlong line is recognised.
         self._line = rest[: LONGEST_LINE + 2]
         return found
 

@@ -1,8 +1,8 @@
 """The drive and its motor as a model: commands in, answers out, at any second; no bytes and no line.
 
-What the drive does where no public document says so is assumed, and marked so beside the code. The commands are those
-that a driver sends. Quasi-static (assumed): the motor is where the reference is, as far as the load permits at the
-current limit, and accelerates as it brakes, by DEC. Lag, mass, friction and heat are left out; without power it stands.
+Behaviour without a public source is assumed, and marked so beside the code. The commands are those that a driver sends.
+Quasi-static (assumed): the motor is where the reference is, as far as the load permits at the current limit, and
+accelerates as it brakes, by DEC. Lag, mass, friction and heat are left out; without power it stands.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ Load = Callable[[float], float]
 """Force on the motor [N], positive against positive motion, at a position [m]; it does not fall with position."""
 
 FORCE_CONSTANT_N_A = 6.5
-"""Of the emulated motor; this, the currents at power-on and the stops are of the order of small tubular linear motors
-(assumed)."""
+"""Of the emulated motor; this, the currents at power-on and the stops have the size of those of small tubular linear
+motors (assumed)."""
 PEAK_CURRENT_A, CONTINUOUS_CURRENT_A = 1.6, 1.0
 STOPS_M = (-10e-3, 10e-3)
 """Mechanical end stops, from the place at power-on."""
@@ -48,7 +48,7 @@ _ABOUT = {"VER": "EMULATOR", "GTYP": "linear motor, Faulhaber ASCII", "GSER": "0
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
-    """The drive's text for a command that it does not carry out."""
+    """The drive's text for a command that it does not execute."""
 
 
 class Motion:
@@ -59,7 +59,7 @@ class Motion:
 
     @property
     def end_s(self) -> float:
-        """When the last piece begins: its speed stays."""
+        """Beginning of the last piece, whose speed stays."""
         return self._pieces[-1][0]
 
     def at(self, t_s: float) -> tuple[float, float]:
@@ -70,15 +70,15 @@ class Motion:
         since_s = max(0.0, t_s - began_s)
         return place + since_s * (speed + 0.5 * acceleration * since_s), speed + acceleration * since_s
 
-    def _go_on(self, seconds: float, acceleration: float) -> None:
+    def _extend(self, seconds: float, acceleration: float) -> None:
         began_s, place, speed, _ = self._pieces.pop()
         self._pieces.append((began_s, place, speed, acceleration))
         self._pieces.append((began_s + seconds, *self.at(began_s + seconds), 0.0))
 
     def to_speed(self, speed: float, rate: float) -> None:
-        """Go over to a speed at the end, at an acceleration that is positive."""
+        """Change to a speed at the end, at an acceleration that is positive."""
         change = speed - self._pieces[-1][2]
-        self._go_on(abs(change) / rate, math.copysign(rate, change))
+        self._extend(abs(change) / rate, math.copysign(rate, change))
 
     def to_position(self, target_m: float, speed: float, rate: float) -> None:
         """End at rest on a target; speed and acceleration are positive."""
@@ -94,7 +94,7 @@ class Motion:
         self.to_speed(math.copysign(peak, target_m - place), rate)
         left = abs(target_m - self._pieces[-1][1]) - peak**2 / (2 * rate)
         if peak > 0.0:
-            self._go_on(max(0.0, left / peak), 0.0)
+            self._extend(max(0.0, left / peak), 0.0)
         self.to_speed(0.0, rate)
         self._pieces[-1] = (self.end_s, target_m, 0.0, 0.0)
 
@@ -116,13 +116,15 @@ class Drive:
     settings
         Numbers by the command that sets them; LL has two, GPL and GNL.
     now_s
-        The second at which everything is looked at; it is set before each call.
+        The present second; it is set before each call.
+    hot
+        Too hot: without power, and none until it cools and is enabled again.
     """
 
     def __init__(self, load: Load | None, options: FaulhaberOptions, stops_m: tuple[float, float]) -> None:
         self.load, self.stops, self.now_s = load, stops_m, 0.0
         self._options = options
-        self._hot = False
+        self.hot = False
         self._motion = Motion(0.0, 0.0)
         self._power_on()
 
@@ -143,17 +145,10 @@ class Drive:
     def _stand(self) -> None:
         self._motion = Motion(self.now_s, self.position_m)
 
-    @property
-    def hot(self) -> bool:
-        """Too hot: without power, and without any until it is switched on again."""
-        return self._hot
-
-    @hot.setter
-    def hot(self, hot: bool) -> None:
-        if hot and not self._hot:
-            self._stand()
-            self.enabled = False
-        self._hot = hot
+    def lose_power(self) -> None:
+        """Stand without power, as after DI."""
+        self._stand()
+        self.enabled = False
 
     @property
     def position_m(self) -> float:
@@ -171,7 +166,7 @@ class Drive:
         return 0.0 if self._pressed()[2] else self._motion.at(self.now_s)[1]
 
     def _pressed(self) -> tuple[float, float, bool]:
-        """Return where the motor is, the force that it exerts [N], and whether that is as large as it can."""
+        """Return the motor's place [m], its force [N], and whether the force is at the current limit."""
         reference_m = self._motion.at(self.now_s)[0]
         if not self.enabled:
             return reference_m, 0.0, False
@@ -180,7 +175,7 @@ class Drive:
         place_m = min(max(reference_m, low), high)
         force_n = 0.0 if self.load is None else self.load(place_m)
         if self.load is not None and abs(force_n) > most_n:
-            # Where the load is as large as the limit: further out for a load against positive motion.
+            # The place at which load and limit are equal: further out for a load against positive motion.
             low, high = (low, place_m) if force_n > 0 else (place_m, high)
             for _ in range(50):
                 place_m = 0.5 * (low + high)
@@ -193,12 +188,12 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Carry a command out; return its answer, empty if it has none.
+        """Execute a command; return its answer, empty if it has none.
 
         Raises
         ------
         Refused
-            If the drive does not carry it out; its text is the answer.
+            If the drive does not execute it; its text is the answer.
         """
         name, argument = command
         if argument is None and (found := self._queried(name)) is not None:
@@ -214,8 +209,7 @@ class Drive:
                     # A motor switched on stays where it is.
                     self.enabled, self._at_speed, self.target_m = True, False, self.position_m
             case "DI":
-                self._stand()
-                self.enabled = False
+                self.lose_power()
             case "LA":
                 self._loaded_m = self._place_m(self._number(argument, LARGEST_POSITION))
             case "M":
@@ -226,8 +220,8 @@ class Drive:
                 self._at_speed = True
                 self._begin().to_speed(min(max(units, -most), most) * self._options.speed_unit_m_s, self._rate)
             case "HO":
-                called = 0 if argument is None else self._number(argument, LARGEST_POSITION)
-                self._origin_m = self.position_m - self._options.position_m(called)
+                here = 0 if argument is None else self._number(argument, LARGEST_POSITION)
+                self._origin_m = self.position_m - self._options.position_m(here)
             case "LL":
                 limit = self._number(argument, LARGEST_POSITION)
                 if limit == 0:
@@ -245,7 +239,7 @@ class Drive:
         return self._options.acceleration_unit_m_s2 * self.settings["DEC"]
 
     def _begin(self) -> Motion:
-        """Return a new motion, from where the reference is and as fast as it is now."""
+        """Return a new motion, from the present place and speed of the reference."""
         self._motion = Motion(self.now_s, *self._motion.at(self.now_s))
         return self._motion
 

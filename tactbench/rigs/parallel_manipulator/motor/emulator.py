@@ -29,9 +29,9 @@ from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 ANSWER_S = 1e-3
 """From the end of a command to the start of its answer (assumed)."""
 TICK_S = 1e-3
-"""How often a motor that moves is looked at."""
+"""Period of the polls while the motor moves."""
 BEYOND_M = 2e-3
-"""How far an emulated motor goes beyond the ends of travel that its options state (assumed)."""
+"""Distance of an emulated motor's stops from the ends of travel that its options state (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class MotorEmulator(DeviceEmulator):
     stops_m
         Mechanical ends, from the place at power-on.
     faults
-        What is wrong with it; may be changed at any time.
+        Its faults; may be changed at any time.
     """
 
     def __init__(
@@ -89,17 +89,17 @@ class MotorEmulator(DeviceEmulator):
 
     @property
     def position_m(self) -> float:
-        """Where the motor is, as its driver counts once it has homed it [m]."""
+        """Position of the motor in the coordinate of its driver after homing [m]."""
         return self.drive.position_m + self._begins_m
 
     def press_against(self, force_n: Callable[[float], float] | None) -> None:
-        """Let a force [N] at such a position act on the motor; None: none, ever."""
+        """Let a force [N], given at such a position, act on the motor; None: no force."""
         self.drive.load = None if force_n is None else lambda at_m: force_n(at_m + self._begins_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
-        """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
+        """Take bytes that the host sends from `now_s` on, at the line's rate; return as `poll`.
 
-        Times do not go back: an earlier one counts as the latest seen.
+        Times do not go back: an earlier one counts as the latest.
         """
         assert isinstance(piece, bytes)
         self._in_free_s = max(self._in_free_s, now_s, self._now_s)
@@ -109,13 +109,13 @@ class MotorEmulator(DeviceEmulator):
         return self.poll(now_s)
 
     def poll(self, now_s: float) -> list[Sent]:
-        """Go on to `now_s`; return what has left the drive by then, of each line the first byte and the rest."""
+        """Go on to `now_s`; return the pieces sent by then, of each line the first byte and the rest."""
         now_s = max(now_s, self._now_s)
         while self._in and self._in[0][0] <= now_s:
             at_s, part = self._in.popleft()
             self._go_to(at_s)
             for command in self._reader.feed(part):
-                self._carry_out(command, at_s)
+                self._execute(command, at_s)
         self._go_to(now_s)
         found: list[Sent] = []
         while self._out and self._out[0][0] <= now_s:
@@ -123,7 +123,7 @@ class MotorEmulator(DeviceEmulator):
         return found
 
     def next_s(self) -> float:
-        """Return when something may happen next: a command in, a line out, a fault; or the motor moves."""
+        """Return the time of the next event: a command in, a line out, a fault, a poll of a motor that moves."""
         faults_s = [fault.start_s for fault in self.faults if fault.start_s > self._now_s]
         queues_s = [queue[0][0] for queue in (self._in, self._out) if queue]
         return min([*queues_s, *faults_s, self._now_s + TICK_S if self.drive.moving else math.inf])
@@ -132,13 +132,14 @@ class MotorEmulator(DeviceEmulator):
         self._now_s = self.drive.now_s = now_s
         hot = self._active("motor-fault", now_s) is not None
         if hot and not self.drive.hot:
+            self.drive.lose_power()
             self._send("f", now_s)
         self.drive.hot = hot
 
     def _active(self, name: str, at_s: float) -> MotorFault | None:
         return next((fault for fault in self.faults if fault.name == name and fault.active(at_s)), None)
 
-    def _carry_out(self, command: Command, at_s: float) -> None:
+    def _execute(self, command: Command, at_s: float) -> None:
         try:
             answer = self.drive.answer(command)
         except Refused as refusal:
@@ -152,7 +153,7 @@ class MotorEmulator(DeviceEmulator):
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")
         if fault_concerns(self.faults, "garbled-line", at_s, self._seen):
-            # Any other byte than the right one: also a digit for a digit, which no host can notice.
+            # Any other byte than the right one, also a digit for a digit, which no host can notice.
             line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
         first_s = max(self._out_free_s, at_s) + self._byte_s
         self._out_free_s = first_s + (len(line) - 1) * self._byte_s
@@ -165,7 +166,7 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
     options = read_options(FaulhaberOptions, settings.options, "faulhaber")
     low, high = STOPS_M
     if options.homing == "here" and options.lower_m is not None and options.upper_m is not None:
-        # It has the travel that is stated, counted from where it stands now, and a little more.
+        # It has the stated travel, counted from its present place, and a little more.
         low = min(low, options.lower_m - options.home_m - BEYOND_M)
         high = max(high, options.upper_m - options.home_m + BEYOND_M)
     if options.homes_towards() < 0 and options.retreat_m is not None and options.upper_m is not None:

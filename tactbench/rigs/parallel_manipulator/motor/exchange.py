@@ -1,8 +1,8 @@
 """Commands and answers on the drive's line: in order, within their time, apart from notices.
 
 Answers name no command and have no checksum; the drive answers in the order of commands (sourced as in ``codec.py``).
-So after an answer that did not come nothing is believed until the drive has answered a question whose answer is known:
-what comes before is late.
+So after a lost answer no line is assigned until the drive has answered a query whose answer is known: lines before that
+are late.
 """
 
 from __future__ import annotations
@@ -12,32 +12,15 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerError, PositionerSilentError
-from tactbench.rigs.parallel_manipulator.motor.codec import (
-    INVALID_PARAMETER,
-    LONGEST_ANSWER,
-    NOT_AVAILABLE,
-    OVERTEMPERATURE,
-    UNKNOWN_COMMAND,
-    Kind,
-    Line,
-    LineReader,
-    encode,
-    line_time_s,
-)
+from tactbench.rigs.parallel_manipulator.motor.codec import LONGEST_ANSWER, Kind, Line, LineReader, encode, line_time_s
 
 MARK = "VER"
-"""The question whose answer is known: the drive's version does not change."""
+"""The query whose answer is known: the drive's version does not change."""
 IN_A_ROW = 3
-"""Answers that did not come one after the other, after which the drive is said to be silent (assumed)."""
+"""Lost answers one after the other, after which the drive counts as silent (assumed)."""
 HOST_S = 0.15
-"""Added to what the line takes: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by some
+"""Added to the time of the line: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by some
 60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
-_HINTS = {
-    UNKNOWN_COMMAND: "Is it a Faulhaber drive of the 300x RS generation?",
-    INVALID_PARAMETER: "Check the options in the rig file against the drive's manual.",
-    NOT_AVAILABLE: "Is the drive enabled, and does it have this command?",
-    OVERTEMPERATURE: "Let it cool down, then enable it again.",
-}
 
 
 class MotorRefusalError(PositionerError):
@@ -45,12 +28,12 @@ class MotorRefusalError(PositionerError):
 
 
 class Answer(NamedTuple):
-    """What became of a command."""
+    """The outcome of a command."""
 
     name: str
     argument: int | None
-    of: object
-    """What `send` was given with it."""
+    of: int | None
+    """The number that `send` got with it."""
     line: Line | None = None
     """None: no answer came in time."""
 
@@ -64,12 +47,13 @@ class Answer(NamedTuple):
         text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
             raise PositionerSilentError(
-                f"The motor's drive did not answer {text} in time; whether it was carried out is not known.",
+                f"The motor's drive did not answer {text} in time; it may have carried it out.",
                 hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
             raise MotorRefusalError(
-                f"The motor's drive answers {text} with: {self.line.text}.", hint=_HINTS[self.line.text]
+                f"The motor's drive answers {text} with: {self.line.text}.",
+                hint="Is it of the 300x RS generation, enabled and cool? Check the rig file against its manual.",
             )
         return self.line
 
@@ -84,10 +68,12 @@ class Exchange:
     clock
         Of the link.
     baud
-        Of the line: time-outs go by it.
+        Of the line: timeouts depend on it.
 
     Attributes
     ----------
+    version
+        The drive's, once :meth:`greet` has read it.
     fault
         Whether the drive has sent the notice of a fault since this was last set back.
     counts
@@ -96,22 +82,21 @@ class Exchange:
 
     def __init__(self, link: ByteLink, clock: Clock, baud: int) -> None:
         self.answer_s = 3.0 * line_time_s(LONGEST_ANSWER, baud) + HOST_S
+        self.version = ""
         self.fault = False
         self.counts: Counter[str] = Counter()
         self._link, self._clock = link, clock
         self._reader = LineReader()
         self._out: deque[Answer] = deque()
-        self._since_ns = 0
-        self._version = ""
+        self._since_ns = self._missed = 0
         self._marking = False
-        self._missed = 0
 
     @property
     def ready(self) -> bool:
-        """Whether no answer is waited for."""
+        """Whether no answer is outstanding."""
         return not self._out and not self._marking
 
-    def send(self, name: str, argument: int | None = None, of: object = None) -> None:
+    def send(self, name: str, argument: int | None = None, of: int | None = None) -> None:
         """Send a command now, also while others are out: the drive keeps their order. `of` comes with the answer."""
         if not self._out:
             self._since_ns = self._clock()
@@ -119,7 +104,7 @@ class Exchange:
         self._out.append(Answer(name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
-        """Take what comes, and wait for the first of it at most so long; return what became of commands.
+        """Read lines, waiting at most so long for the first byte; return the outcomes of commands.
 
         Raises
         ------
@@ -138,7 +123,7 @@ class Exchange:
         return found if found or self.ready or self._clock() < due_ns else self._overdue()
 
     def greet(self) -> str:
-        """Find the drive: end what stands in its line, and ask for its version until two answers are the same.
+        """Find the drive: end a partial command on its line, and read its version until two answers are the same.
 
         Raises
         ------
@@ -147,7 +132,7 @@ class Exchange:
         """
         self._link.write(b"\r")
         self.quiet()
-        self._version, before = "", ""
+        self.version, before = "", ""
         for _ in range(5):
             self.send(MARK)
             answers: list[Answer] = []
@@ -157,7 +142,7 @@ class Exchange:
             if line is None:
                 self.quiet()
             elif line.text == before and line.kind is not Kind.REFUSAL:
-                self._version = before
+                self.version = before
                 return before
             before = "" if line is None else line.text
         raise LinkTimeout(
@@ -167,7 +152,7 @@ class Exchange:
         )
 
     def quiet(self) -> None:
-        """Drop what comes until nothing has come for the time of an answer; at most ten times that."""
+        """Drop what is received until the line was silent for the time of an answer; at most ten times that."""
         deadline = self._clock() + round(1e10 * self.answer_s)
         with suppress(LinkTimeout):
             while self._clock() < deadline:
@@ -182,7 +167,7 @@ class Exchange:
         elif line.kind is Kind.GARBLED:
             self.counts["garbled"] += 1
         elif self._marking:
-            self._marking = line.text != self._version
+            self._marking = line.text != self.version
             self.counts["late"] += self._marking
             self._since_ns = self._since_ns if self._marking else self._clock()
         elif self._out and line.answers(self._out[0].name):
@@ -194,7 +179,7 @@ class Exchange:
         return []
 
     def _overdue(self) -> list[Answer]:
-        """Give up what is out, and ask what is known; raises PositionerSilentError."""
+        """Give up all outstanding answers, and send the mark; raises PositionerSilentError."""
         lost = list(self._out)
         self._out.clear()
         self._reader.clear()
@@ -207,7 +192,7 @@ class Exchange:
                 f"{self.answer_s:.2f} s.",
                 hint="Check its power and cable. The motor, if it moves, ends its last move and holds.",
             )
-        if self._version:
+        if self.version:
             self._marking, self._since_ns = True, self._clock()
             self._link.write(encode(MARK))
         return lost

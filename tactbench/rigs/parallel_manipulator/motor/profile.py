@@ -1,4 +1,4 @@
-"""What a rig file says of a motor on a Faulhaber drive, and what the drive's integers mean.
+"""Options of a motor on a Faulhaber drive in a rig file, and the units of the drive's integers.
 
 No public document that was read states the units of the linear drives (MCLM 300x RS), and Karl et al. 2016 name no
 motor: the defaults are assumed, and a rig states its own.
@@ -20,10 +20,10 @@ LARGEST_POSITION, LARGEST_SPEED, LARGEST_ACCELERATION, LARGEST_CURRENT = 1_800_0
 
 
 class FaulhaberOptions(PositionerOptions):
-    """What a rig file says of a motor and its drive; what it leaves out is as the drive has it."""
+    """Options of a motor and its drive; settings that are left out stay as the drive has them."""
 
     baud: int = Field(default=9600, gt=0)
-    """As in the link's address: time-outs go by it."""
+    """As in the link's address: timeouts depend on it."""
     increment_m: float = Field(default=6e-6, gt=0.0)
     """Length of one increment (assumed: 3000 per 18 mm of magnet pitch, in no document read)."""
     speed_unit_m_s: float = Field(default=1e-3, gt=0.0)
@@ -40,15 +40,15 @@ class FaulhaberOptions(PositionerOptions):
     force_constant_n_a: float | None = Field(default=None, gt=0.0)
     """Force per current: times the limit of current it is the largest force."""
     homing: Literal["here", "end-stop"] = "here"
-    """Where positions count from: the place at which it stands, or an end stop that is run against."""
+    """Origin of positions: the place at which it stands, or an end stop that it runs against."""
     homing_speed_m_s: float = 0.005
     """Towards the end stop; negative: towards negative positions."""
     homing_current_a: float = Field(default=0.2, gt=0.0)
-    """With which it runs against an end stop."""
+    """Limit of current while it runs against an end stop."""
 
     @property
     def current_limit_a(self) -> float | None:
-        """Limit of current that the drive is sent [A]: the lower one of `peak_current_a` and what gives `peak_force_n`.
+        """Limit of current that the drive is sent [A]: `peak_current_a`, or the current of `peak_force_n` if lower.
 
         None: neither is stated, or the force without its constant.
         """
@@ -66,7 +66,7 @@ class FaulhaberOptions(PositionerOptions):
 
     @property
     def force_source(self) -> str:
-        """Where :attr:`largest_force_n` comes from."""
+        """The source of :attr:`largest_force_n`."""
         if self.current_limit_a is None or self.largest_force_n is None:
             return super().force_source
         sent = f"sent current limit, {self.current_limit_a:g} A"
@@ -76,7 +76,7 @@ class FaulhaberOptions(PositionerOptions):
         """Return the sign of the homing speed against an end stop; 0: it stands."""
         return int(math.copysign(1, self.homing_speed_m_s)) if self.homing == "end-stop" else 0
 
-    # What the drive's integers mean; each raises RigError for what the drive does not take.
+    # The drive's integers; each conversion raises RigError for a value that the drive does not take.
 
     def increments(self, position_m: float) -> int:
         """Return the nearest position argument."""
@@ -105,7 +105,7 @@ def _down(steps: float) -> int:
 
 
 def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable[[float], int]) -> int:
-    """Return a value in the drive's units; what is not 0 becomes 0 only where that is the nearest position."""
+    """Return a value in the drive's units; a value other than 0 becomes 0 only as the nearest position."""
     steps = rounded(value / unit) if math.isfinite(value) else largest + 1
     if abs(steps) > largest or (steps == 0 != value and rounded is _down):
         raise RigError(

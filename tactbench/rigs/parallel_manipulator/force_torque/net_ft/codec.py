@@ -26,10 +26,8 @@ _RECORD = struct.Struct(">III6i")
 _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
 RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
-"""The same as `_RECORD`, for many at once."""
+"""The same as `_RECORD`, for arrays."""
 SEQUENCE_MODULUS = 1 << 32
-LEAST_COUNT, GREATEST_COUNT = -(2**31), 2**31 - 1
-"""Of the signed 32 bits of a record."""
 SENSOR_RATE_HZ = 7000
 """The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
 public client)."""
@@ -38,10 +36,10 @@ STREAM = "force_torque"
 
 
 class NetFtOptions(Options):
-    """What a rig file says of a box: all of it is on the box's web page."""
+    """Options of a box in a rig file, all of them on the box's web page."""
 
     rate_hz: float = Field(default=1000.0, gt=0.0, le=SENSOR_RATE_HZ)
-    """Records a second that the box is set to send; its own web page sets them, no request does."""
+    """Records a second that the box sends, as set on its web page: no request sets them."""
     counts_per_newton: float = Field(gt=0.0)
     counts_per_newton_metre: float = Field(gt=0.0)
 
@@ -69,7 +67,7 @@ class NetFtOptions(Options):
         """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
         counts = np.rint(np.asarray(wrench, dtype=float) * self._divisors)
         # np.clip would take ten times as long for six.
-        return np.minimum(np.maximum(counts, LEAST_COUNT), GREATEST_COUNT).astype(np.int64)
+        return np.minimum(np.maximum(counts, -(2**31)), 2**31 - 1).astype(np.int64)
 
     @cached_property
     def _divisors(self) -> FloatArray:
@@ -81,13 +79,10 @@ class DatagramError(RigError, ValueError):
 
 
 class Command(IntEnum):
-    """What a request asks for."""
+    """Commands of a request; the box has more, which no driver here sends."""
 
     STOP = 0x0000
     START_REALTIME = 0x0002
-    START_BUFFERED = 0x0003
-    RESET_CONDITION_LATCH = 0x0041
-    SET_SOFTWARE_BIAS = 0x0042
 
 
 class Request(NamedTuple):
@@ -95,7 +90,7 @@ class Request(NamedTuple):
 
     command: Command
     records: int = 0
-    """How many are wanted; 0: until stopped."""
+    """Their number; 0: until stopped."""
 
 
 class Record(NamedTuple):
@@ -123,7 +118,7 @@ def decode_request(data: bytes) -> Request:
             return Request(Command(command), count)
     except (struct.error, ValueError):
         pass
-    raise DatagramError(f"A request has {_REQUEST.size} bytes, begins with {_HEADER:04X} and has a known command.")
+    raise DatagramError(f"{data!r} is no request of {_REQUEST.size} bytes, header {_HEADER:04X} and a known command.")
 
 
 def encode_record(record: Record) -> bytes:
@@ -146,14 +141,14 @@ def decode_records(data: bytes) -> npt.NDArray[np.void]:
 
 ERROR_SUMMARY, SATURATION, CONDITION_LATCHED = 0x80000000, 0x00020000, 0x00010000
 WARNING = ERROR_SUMMARY | CONDITION_LATCHED
-"""A threshold set in the sensor was passed: exactly this; its values are good (sourced: pyNetFT, status.cpp)."""
+"""The status where a threshold set in the box was passed; its values are good (sourced: pyNetFT, status.cpp)."""
 
 
 def quality(status: int) -> Quality:
-    """Return the mark of all six channels: a saturated sensor is told apart from other errors.
+    """Return the mark of all six channels: saturation is distinguished from other errors.
 
     Errors are SUSPECT, not MISSING: the box forbids the use of the values, yet many of its bits (of the network, of
-    other buses) do not touch them, and a mark keeps both facts.
+    other buses) do not concern them, and a mark keeps both facts.
     """
     if status in (0, WARNING):
         return Quality.GOOD

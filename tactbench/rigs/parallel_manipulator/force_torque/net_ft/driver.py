@@ -1,4 +1,4 @@
-"""The driver of a Net F/T box: records over UDP into blocks, all of them, in the order in which they come."""
+"""The driver of a Net F/T box: records over UDP into blocks, all of them, in the order of receipt."""
 
 from __future__ import annotations
 
@@ -33,22 +33,16 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 )
 
 QUIET_S = 0.05
-"""After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
+"""Silence after which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
 MOST_SILENCED = 4096
-"""Datagrams after which a box that goes on is left alone: 4 s at 1 kHz."""
+"""Largest number of datagrams that are dropped of a box that does not stop: 4 s at 1 kHz."""
 ANSWER_S = 0.5
-"""Within which a box answers, over the time its records take (assumed: a network of one cable)."""
-
-
-MOST_JOINED = 40
-"""Records that a box may put into one datagram, which it does not send before it has them (assumed)."""
-MOST_STRANGE = 100
-"""Datagrams of another length in a row after which the box sends no other ones (assumed)."""
+"""Longest time of an answer beside that of its records (assumed: a network of one cable)."""
 
 
 def _other_length(piece: Received) -> RigError:
     return RigError(
-        f"A datagram of {len(piece.data)} bytes came, and one record of {RECORD_BYTES} bytes was expected.",
+        f"A datagram of {len(piece.data)} bytes was received; one record has {RECORD_BYTES} bytes.",
         hint="Set the RDT buffer size on the box's web page to 1: one record a datagram.",
     )
 
@@ -56,13 +50,13 @@ def _other_length(piece: Received) -> RigError:
 class NetFtDriver(Driver):
     """A box on a datagram link.
 
-    Blocks hold every record that came, in the order of arrival: `sequence` is the record's own number, so that one that
-    came twice has the same and one that came late a lower one. `device_ns` is the box's count of its own samples at
-    7 kHz, as time: a clock as good as the box's oscillator, and only as long as it samples. `t_ns` is the receipt.
+    Blocks hold every record in the order of receipt: `sequence` is the record's own number, so that one received twice
+    has the same and one received late a lower one. `device_ns` is the box's count of its own samples at 7 kHz, as time:
+    a clock as good as the box's oscillator, and only while it samples. `t_ns` is the receipt.
 
     A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, and both both; a
-    threshold set in the box is a warning: it is counted, its values are good. Nothing is asked for again where nothing
-    comes: `read` then returns nothing. A box that was without power counts anew, and stays silent until it is started.
+    threshold set in the box is a warning: it is counted, its values are good. `read` of a silent box returns no block.
+    A box that was without power counts anew, and stays silent until it is started.
     """
 
     device, link_kind, address = "net-ft", DatagramLink, "udp://192.168.1.1:49152"
@@ -76,7 +70,6 @@ class NetFtDriver(Driver):
         self._kept: list[Received] = []
         self._sampling = self._silent = False
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
-        self._strange = 0
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -92,7 +85,7 @@ class NetFtDriver(Driver):
         return {name: count for name, count in self._counts.items() if count}
 
     def identify(self) -> Mapping[str, str]:
-        """Look at two records; return rate and status.
+        """Read two records; return rate and status.
 
         Raises
         ------
@@ -102,7 +95,7 @@ class NetFtDriver(Driver):
             If the box sends at another rate than the options state, or several records in a datagram.
         """
         self._silence()
-        self._send(Command.START_REALTIME, 2 * MOST_JOINED)
+        self._send(Command.START_REALTIME)
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
         self._silence()
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
@@ -122,7 +115,7 @@ class NetFtDriver(Driver):
         LinkTimeout
             If none comes.
         """
-        if not self._silent:  # else the other devices of a rig, which sample already, would wait for nothing
+        if not self._silent:  # the other devices of a rig sample already, and would wait
             self._silence()
         self._silent = False
         self.link.discard()
@@ -132,36 +125,36 @@ class NetFtDriver(Driver):
         self._kept = [self._next()]
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the records that came.
+        """Return the records that were received.
 
         Raises
         ------
         LinkUnplugged
-            If the network says that nobody listens there.
+            If the network reports that the port of the box is closed.
         RigError
-            If datagrams of another length alone come.
+            If a datagram holds several records.
         """
-        came, self._kept = self._kept, []
-        came += self.link.receive_all(0.0 if came else timeout_s)
-        whole = [piece for piece in came if len(piece.data) == RECORD_BYTES]
-        self._counts["rejected"] += len(came) - len(whole)
-        self._strange = 0 if whole else self._strange + len(came)
-        if self._strange > MOST_STRANGE:
-            raise _other_length(came[-1])
-        return [self._block(whole)] if whole else []
+        received, self._kept = self._kept, []
+        received += self.link.receive_all(0.0 if received else timeout_s)
+        records = [piece for piece in received if len(piece.data) == RECORD_BYTES]
+        for piece in received:
+            if len(piece.data) > RECORD_BYTES and len(piece.data) % RECORD_BYTES == 0:
+                raise _other_length(piece)
+        self._counts["rejected"] += len(received) - len(records)
+        return [self._block(records)] if records else []
 
     def stop(self) -> None:
-        """Let the box send no more, and wait until nothing comes."""
+        """Let the box send no more, and wait until it is silent."""
         if self._sampling:
             self._sampling, self._kept = False, []
             with suppress(LinkError):
                 self._silence()
 
-    def _send(self, command: Command, records: int = 0) -> None:
-        self.link.send(encode_request(Request(command, records)))
+    def _send(self, command: Command) -> None:
+        self.link.send(encode_request(Request(command)))
 
     def _silence(self) -> None:
-        """Stop the box, and drop what it sent before: records of an earlier start would seem to be of the next one."""
+        """Stop the box, and drop all that it sent before: records of an earlier start would seem to be of the next."""
         self._send(Command.STOP)
         with suppress(LinkTimeout):
             for _ in range(MOST_SILENCED):
@@ -169,17 +162,18 @@ class NetFtDriver(Driver):
         self._silent = True
 
     def _next(self) -> Received:
-        piece = self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
+        """Return the next record; raises LinkTimeout if none comes, and RigError for a datagram of another length."""
+        piece: Received = self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
         if len(piece.data) != RECORD_BYTES:
             raise _other_length(piece)
         return piece
 
-    def _block(self, came: list[Received]) -> Block:
-        records = decode_records(b"".join(piece.data for piece in came))
+    def _block(self, received: list[Received]) -> Block:
+        records = decode_records(b"".join(piece.data for piece in received))
         ticks, numbers = self._ticks(records["ft_sequence"]), self._numbers(records["rdt_sequence"])
         return Block(
             stream=STREAM,
-            t_ns=np.array([piece.t_ns for piece in came], dtype=np.int64),
+            t_ns=np.array([piece.t_ns for piece in received], dtype=np.int64),
             data=self.options.wrench(records["counts"]),
             quality=self._marks(records["status"]) if records["status"].any() else None,
             sequence=numbers,

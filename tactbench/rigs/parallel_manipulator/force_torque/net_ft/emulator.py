@@ -37,7 +37,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 
 @dataclass(frozen=True)
 class DatagramFault(Fault):
-    """A fault of the sensor, or of the way its datagrams take."""
+    """A fault of the sensor or of the network."""
 
     known: ClassVar[Mapping[str, str]] = {
         "dropped": "a datagram does not arrive",
@@ -48,7 +48,7 @@ class DatagramFault(Fault):
 
 
 LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
-"""Where the sensor saturates [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
+"""Ends of the sensor's range [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
 
 
 class RdtEmulator(DeviceEmulator):
@@ -57,7 +57,7 @@ class RdtEmulator(DeviceEmulator):
     Attributes
     ----------
     faults
-        What is wrong with it; may be changed at any time.
+        Its faults; may be changed at any time.
 
     Raises
     ------
@@ -79,9 +79,9 @@ class RdtEmulator(DeviceEmulator):
         self._held: bytes | None = None
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
-        """Take one datagram of the host; return what `poll` returns.
+        """Take one datagram of the host; return as `poll`.
 
-        Times do not go back: an earlier one counts as the latest seen.
+        Times do not go back: an earlier one counts as the latest.
         """
         sent = self.poll(now_s)
         assert isinstance(piece, bytes)
@@ -89,11 +89,10 @@ class RdtEmulator(DeviceEmulator):
             request = decode_request(piece)
         except DatagramError:
             return sent
-        if request.command in (Command.START_REALTIME, Command.STOP):
-            sent += self._ended(self._now_s)
+        sent += self._ended(self._now_s)
         if request.command is Command.START_REALTIME:
             self._left, self._sequence = request.records, 1
-            # The first sample after the request: a sample is not older than what asks for it.
+            # The first sample after the request: no sample is older than its request.
             self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
         return sent
 
@@ -106,7 +105,7 @@ class RdtEmulator(DeviceEmulator):
         return sent
 
     def next_s(self) -> float:
-        """Return when the next record is due; infinite while nothing is being sent."""
+        """Return the time of the next record; infinite while the box does not send."""
         return math.inf if self._next is None else self._next / SENSOR_RATE_HZ
 
     def _one(self, sample: int) -> list[Sent]:
@@ -127,7 +126,7 @@ class RdtEmulator(DeviceEmulator):
         return sent + self._ended(at_s) if self._left == 0 else sent
 
     def _ended(self, at_s: float) -> list[Sent]:
-        """Stop sending; return what is still under way."""
+        """Stop sending; return a datagram that is still under way."""
         self._next = None
         return self._released(at_s)
 
@@ -136,7 +135,7 @@ class RdtEmulator(DeviceEmulator):
         return [] if held is None else [(at_s, held)]
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
-        """Return what arrives of a datagram sent at a time, in the order of arrival."""
+        """Return the datagrams that arrive after one was sent, in the order of arrival."""
         dropped, doubled, late = (
             fault_concerns(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
         )
