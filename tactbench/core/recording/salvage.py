@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
@@ -32,9 +31,9 @@ def salvage(path: Path) -> Recording:
     import h5py
 
     journal = read_journal(path)
-    meta, text = _fitted(journal, parse_meta(path, journal.text))
-    file = image.build(meta, text, journal.blocks(), journal.annotations, complete=False)
-    recording = Recording(path, h5py.File(h5py.h5f.open_file_image(file)), text, complete=False)
+    meta = _fitted(journal, parse_meta(path, journal.text))
+    file = image.build(meta, journal.blocks(), journal.annotations, complete=False)
+    recording = Recording(path, h5py.File(h5py.h5f.open_file_image(file)), layout.meta_text(meta), complete=False)
     recording.verify()
     return recording
 
@@ -58,15 +57,12 @@ def rescue(path: Path, target: Path) -> None:
     meta = parse_meta(path, journal.text)
     excluded = meta.excluded or "interrupted: it broke off, and was rescued"
     update = {"remarks": (*meta.remarks, REMARK), "excluded": excluded}
-    meta, text = _fitted(journal, meta.model_copy(update=update))
-    with writable(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-    aside = layout.completing_path(target)
-    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False, sync=True)
+    meta = _fitted(journal, meta.model_copy(update=update))
+    image.store(target, meta, journal.blocks(), journal.annotations, aside=layout.completing_path(target))
 
 
-def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
-    """Return the meta with clock fits and counts of rows from the blocks, and the same as text."""
+def _fitted(journal: Journal, meta: RecordingMeta) -> RecordingMeta:
+    """Return the meta with clock fits and counts of rows from the blocks."""
     rows: Counter[str] = Counter()
 
     def counted() -> Iterator[tuple[str, Columns]]:
@@ -76,5 +72,4 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
 
     fitted = with_clock_fits(meta, counted())
     streams = {name: counts.model_copy(update={"written": rows[name]}) for name, counts in meta.streams.items()}
-    fitted = fitted.model_copy(update={"streams": streams})
-    return fitted, layout.meta_text(fitted)
+    return fitted.model_copy(update={"streams": streams})

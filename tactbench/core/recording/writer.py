@@ -98,7 +98,7 @@ class RecordingWriter:
         if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
-            self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
+            self.path, self.meta, self._blocks(journal), self._annotations,
             aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
         )  # fmt: skip
 
@@ -211,10 +211,8 @@ def write_recording(
     meta = with_clock_fits(meta, stored)
     if not replace:
         image.require_free(path)
-    with writable(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
     aside = layout.completing_path(path)
-    image.store(path, meta, layout.meta_text(meta), stored, annotations, aside=aside, replace=replace, sync=False)
+    image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
     return meta
 
 
