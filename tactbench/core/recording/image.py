@@ -100,7 +100,7 @@ def build(meta: RecordingMeta, blocks: Blocks, annotations: Annotations, *, comp
     return hdf5_image(lambda file: _fill(file, meta, blocks, annotations, complete))
 
 
-def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotations, complete: bool) -> None:  # noqa: FBT001
+def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotations, complete: bool) -> None:
     import h5py
 
     text = layout.meta_text(meta)

@@ -13,7 +13,7 @@ from tactbench.core.errors import MappingError, complaint
 from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamSource
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
 from tactbench.core.spec.recording import Scalar
-from tactbench.core.spec.sensor import SENSOR_NAME, ChannelSpec, SensorSpec, StreamSpec
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 
 _RANGE = re.compile(r"^(?P<before>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
 _WORD = re.compile(r"\{([^{}]*)\}")
@@ -75,7 +75,7 @@ def expand(text: Scalar) -> Iterator[Scalar]:
 
 
 def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]]:
-    """Return the sensor, and all streams with their columns; see :func:`device`.
+    """Return the sensor, and all streams with their columns; words in its name are not filled in yet.
 
     Raises
     ------
@@ -101,23 +101,6 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]
             f"The sensor of the mapping is not valid: {complaint(error)}.", hint="Correct its streams and channels."
         ) from error
     return sensor, streams
-
-
-def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar], origin: str) -> SensorSpec:
-    """Return the sensor with the name and title that a recording's words give it.
-
-    Raises
-    ------
-    MappingError
-        If a sensor cannot have that name.
-    """
-    name = fill(mapping.sensor.name, words, "sensor.name")
-    if not re.fullmatch(SENSOR_NAME, name):
-        raise MappingError(
-            f"{origin}: {name!r} cannot be the name of a sensor.",
-            hint="Use lower case, digits, - and _; translate words under `words`.",
-        )
-    return sensor.model_copy(update={"name": name, "title": fill(mapping.sensor.title, words, "sensor.title")})
 
 
 def columns_of(group: ChannelGroup) -> list[Column]:

@@ -14,16 +14,16 @@ from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import cast, get_args
 
 import numpy as np
 import yaml
+from pydantic import ValidationError
 
-from tactbench.core.errors import MappingError, RecordingError
+from tactbench.core.errors import MappingError, RecordingError, complaint
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
-from tactbench.core.recording.mapping.channels import MappedStream, device, fill, no_translation, sensor_of
+from tactbench.core.recording.mapping.channels import MappedStream, fill, no_translation, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import compare_clocks, samples, times, translations
@@ -33,7 +33,6 @@ from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
-from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
@@ -179,10 +178,8 @@ def _write_tasks(folder: Path, text: str) -> None:
 def aside(out: Path) -> Iterator[Path]:
     """Return a context with the folder in which recordings wait until all are written; it is hidden from rigs.
 
-    Leftovers of an import that was killed are removed, or moved to their place where that had begun. Folders that were
-    made for an import that fails are removed again.
+    Leftovers of an import that was killed are removed, or moved to their place where that had begun.
     """
-    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
         for left in (*out.glob(f"{WAITING}*"), *out.glob(f"{PLACING}*")):
@@ -195,13 +192,8 @@ def aside(out: Path) -> Iterator[Path]:
     try:
         with _locked(folder):
             yield folder
-    except BaseException:
+    finally:
         _remove(folder)
-        for empty in made:
-            with suppress(OSError):
-                empty.rmdir()
-        raise
-    _remove(folder)
 
 
 @contextmanager
@@ -283,54 +275,46 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict[str, MappedStream]) -> RecordingMeta:
-    origin = ", ".join(raw.files)
+    origin, names = ", ".join(raw.files), mapping.recording
     words: dict[str, Scalar] = dict(raw.words)
     for name, word in mapping.words.items():
         words[name] = _derived(name, word, words, origin)
-    names = mapping.recording
-    name = fill(names.name, words, "recording.name")
-    if not _FILE_NAME.match(name):
+    given = {one: fill(getattr(names, one), words, f"recording.{one}") for one in ("name", "session", "trial", "role")}
+    if not _FILE_NAME.match(given["name"]):
         raise MappingError(
-            f"The recording made from {origin} would be called {name!r}, which is no file name.",
+            f"The recording made from {origin} would be called {given['name']!r}, which is no file name.",
             hint="Use letters, digits, dots, dashes and underscores; translate words under `words`.",
-        )
-    about = {one: fill(getattr(names, one), words, f"recording.{one}") for one in ("session", "trial", "role")}
-    if about["role"] not in ("", *get_args(Role)):
-        raise MappingError(
-            f"The role of {origin} would be {about['role']!r}.", hint=f"Roles: {', '.join(get_args(Role))}, or empty."
         )
     reasons = [one.reason for one in mapping.exclude if any(fnmatchcase(file, one.files) for file in raw.files)]
     unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
     remarks = [f"What time zero means in table {name} is not known." for name in unknown]
     if mapping.clock == "none":
         remarks = ["No clock: the source gives no time and no rate; rows are ordered, that is all."]
-    return RecordingMeta(
-        name=name,
-        sensor=device(sensor, mapping, words, origin),
-        reference=tuple(one.spec for one in streams.values() if one.source.of == "reference"),
-        rig=RIG,
-        simulated=False,
-        clock=mapping.clock,
-        session=about["session"],
-        trial=about["trial"],
-        role=cast("Role | None", about["role"] or None),
-        labels={
-            label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
-            for label, value in names.labels.items()
-        },
-        excluded="; ".join(dict.fromkeys(reasons)),
-        remarks=(*mapping.remarks, *remarks),
-        origin=origin,
-    )
+    about = {one: fill(getattr(mapping.sensor, one), words, f"sensor.{one}") for one in ("name", "title")}
+    try:
+        return RecordingMeta.model_validate(given | {
+            "sensor": SensorSpec.model_validate(dict(sensor) | about),
+            "reference": [one.spec for one in streams.values() if one.source.of == "reference"],
+            "rig": RIG,
+            "simulated": False,
+            "clock": mapping.clock,
+            "role": given["role"] or None,
+            "labels": {
+                label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
+                for label, value in names.labels.items()
+            },
+            "excluded": "; ".join(dict.fromkeys(reasons)),
+            "remarks": (*mapping.remarks, *remarks),
+            "origin": origin,
+        })  # fmt: skip
+    except ValidationError as error:
+        raise MappingError(
+            f"{origin} makes no recording: {complaint(error)}.", hint="Translate its words under `words`."
+        ) from error
 
 
 def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> str:
-    if word.of not in words:
-        raise MappingError(
-            f"The word {name!r} is made of {word.of!r}, which is not known; known are: {', '.join(sorted(words))}.",
-            hint="A word may be made of the words above it, of groups of `path`, and of columns of `split_by`.",
-        )
-    given = composed(str(words[word.of]))
+    given = composed(fill(f"{{{word.of}}}", words, f"word {name}"))
     if word.divided_by is not None:
         if not given.isdecimal():
             raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")

@@ -93,7 +93,8 @@ def times(table: Table, time: Time) -> IntArray:
         stamps = stamps + period * np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -period / 2)
     elif period := wrap_period(stamps, (unit,)):
         raise MappingError(
-            f"{table.where(np.argmax(np.diff(stamps) < 0) + 1)}: column {time.column!r} begins at 0 again, as a full counter does.",
+            f"{table.where(np.argmax(np.diff(stamps) < 0) + 1)}: column {time.column!r} begins at 0 again, as a full "
+            "counter does.",
             hint=f"Write `wraps_at: {period // unit}` under `time`.",
         )
     years = 1970 + stamps / _NS_PER_YEAR
