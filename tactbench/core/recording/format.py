@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,13 @@ of the digest."""
 CHUNK_ROWS = 1024
 
 SEE = "See docs/format.md."
+
+Annotations = dict[str, dict[str, npt.NDArray[Any]]]
+"""Labels of rows by stream and name: (n,) texts or whole numbers."""
+Columns = dict[str, npt.NDArray[Any]]
+"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
+Blocks = Iterable[tuple[str, Columns]]
+"""Stream and columns of each block, in the order of arrival."""
 
 
 @contextmanager

@@ -48,6 +48,7 @@ _UNTIMED = {
 }
 FINDINGS = "findings"
 """Key of the provenance under which an import stores its findings."""
+FIELDS = ("check", "severity", "message", "stream", "channels")
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
 """Checks that mark no score. Taxels without a touch are constant and alike, and those pressed hard saturate; from
 `dead` on, an evaluation that needs the missing data refuses the recording or reports it itself."""
@@ -68,8 +69,6 @@ class Finding:
     stream: str = ""
     """Name of the stream; empty: the whole recording is concerned."""
     channels: tuple[str, ...] = ()
-    count: int = 0
-    """Number of samples, rows or channels that are concerned."""
 
 
 class _Stream:
@@ -165,7 +164,7 @@ def examine(recording: Recording) -> list[Finding]:
         found.extend(_channels(stream))
         if stream.lost_before:
             text = f"{name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
-            found.append(Finding("rows-before-lost", "warning", text, name, count=stream.lost_before))
+            found.append(Finding("rows-before-lost", "warning", text, name))
         if name in recording.meta.clocks:
             found.extend(_clock_fit(name, recording.meta.clocks[name], stream))
         if stream.t_ns is not None:
@@ -189,7 +188,8 @@ def marking(recording: Recording) -> list[Finding]:
     meta = recording.meta
     if FINDINGS in meta.provenance:
         with layout.readable(recording.path):
-            found = [Finding(**one) for one in meta.provenance[FINDINGS]]
+            # Earlier imports stored a count beside these.
+            found = [Finding(*(one[name] for name in FIELDS)) for one in meta.provenance[FINDINGS]]
     else:
         found = [] if meta.simulated and meta.emulation is None else examine(recording)
     return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
@@ -198,14 +198,14 @@ def marking(recording: Recording) -> list[Finding]:
 def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
-        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}", count=1)
+        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}")
     if meta.clock in _UNTIMED:
         yield Finding("no-clock", "info", _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
     if absent:
-        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}", count=len(absent))
+        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}")
 
 
 def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
@@ -217,19 +217,16 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
         ("repeated", "info", again, f"{again} rows came twice or late, and were kept out"),
         ("unaccounted", "warning", open_rows, f"{open_rows} more rows were received than are accounted for"),
     )
-    yield from (Finding(check, severity, f"{stream}: {text}", stream, (), abs(count))
-                for check, severity, count, text in kinds if count)  # fmt: skip
+    yield from (Finding(check, kind, f"{stream}: {text}", stream) for check, kind, count, text in kinds if count)
 
 
 def _channels(stream: _Stream) -> Iterator[Finding]:
     there = stream.rows - stream.missing
 
-    def finding(
-        check: str, severity: Severity, which: npt.NDArray[Any], text: str, count: int = 0
-    ) -> Iterator[Finding]:
+    def finding(check: str, severity: Severity, which: npt.NDArray[Any], text: str) -> Iterator[Finding]:
         names = stream.names(which)
         if names:
-            yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names, count or len(names))
+            yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names)
 
     dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
     yield from finding("dead", "error", dead, "without a single sample")
@@ -237,13 +234,13 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
     saturated, places = stream.saturated > 0, np.arange(len(there))
     for which in [saturated] if saturated.sum() > MOST_LISTED else saturated & np.eye(len(there), dtype=bool):
         count, samples = int(stream.saturated[which].sum()), int(which.sum()) * stream.rows
-        yield from finding("saturated", "warning", which, f"saturated in {count} of {samples} samples", count)
+        yield from finding("saturated", "warning", which, f"saturated in {count} of {samples} samples")
     for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
-        text = f"without a sample in {count} of {stream.rows} rows"
-        yield from finding("missing", "info", stream.missing == count, text, count)
-    count = int(stream.suspect.sum())
-    text = f"in {count} samples with a failed parity, checksum or sequence"
-    yield from finding("suspect", "warning", stream.suspect > 0, text, count)
+        yield from finding(
+            "missing", "info", stream.missing == count, f"without a sample in {count} of {stream.rows} rows"
+        )
+    text = f"in {stream.suspect.sum()} samples with a failed parity, checksum or sequence"
+    yield from finding("suspect", "warning", stream.suspect > 0, text)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
     for place in np.flatnonzero(varies).tolist():
@@ -257,10 +254,10 @@ def _clock_fit(name: str, clock: StreamClock, stream: _Stream) -> Iterator[Findi
     lasts_ns = 0 if stream.t_ns is None else int(stream.t_ns[-1] - stream.t_ns[0])
     wrong = [refused for one in clock.segments if (refused := wrong_rate(name, one.drift, lasts_ns))]
     if wrong:
-        yield Finding("clock-rate", "error", wrong[0], name, count=len(wrong))
+        yield Finding("clock-rate", "error", wrong[0], name)
     if clock.breaks:
         text = f"the clock of {name} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", text, name, count=clock.breaks)
+        yield Finding("clock-lost", "warning", text, name)
 
 
 def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
@@ -270,11 +267,11 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     backward, doubled = int((steps < 0).sum()), int((steps == 0).sum())
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
-        text = f"time runs backwards {backward} times in {stream}, first at row {row}"
-        yield Finding("backward", "error", text, stream, count=backward)
+        text = f"time runs backwards {backward} times in {stream}, first at row {row}; a full counter: `wraps_at`?"
+        yield Finding("backward", "error", text, stream)
     if doubled:
         text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the one before"
-        yield Finding("repeated-time", "warning", text, stream, count=doubled)
+        yield Finding("repeated-time", "warning", text, stream)
     steps.sort()  # in place: there may be tens of millions
     forward = steps[backward + doubled :]
     if len(forward) < 3:
@@ -283,7 +280,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     gaps = len(forward) - int(np.searchsorted(forward, 1e9 * GAP * median, side="right"))
     if gaps:
         text = f"{gaps} gaps in {stream}: up to {1e-9 * forward[-1]:.3g} s, where the median step is {median:.3g} s"
-        yield Finding("gaps", "warning", text, stream, count=gaps)
+        yield Finding("gaps", "warning", text, stream)
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
     if high - low > JITTER * median:
         text = (
@@ -320,7 +317,7 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
             f"{reference.phrase(reference.names(forces))}{place}"
             for place, (late, error) in lags
         )
-        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces), sensor.rows)
+        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces))
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:

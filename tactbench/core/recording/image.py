@@ -16,7 +16,7 @@ from tactbench.core.errors import FormatError, UnwritableError
 from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
-from tactbench.core.recording.partial import Annotations, Blocks, Columns
+from tactbench.core.recording.format import Annotations, Blocks, Columns
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec

@@ -120,7 +120,7 @@ def import_tables(
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
         text = f"its import left files out: {left_out[0]}{more}"
-        beside.append(Finding("left-out", "warning", text, count=len(left_out)))
+        beside.append(Finding("left-out", "warning", text))
     made: list[Imported] = []
     shapes: dict[str, Shape] = {}
     origins: dict[str, str] = {}
@@ -240,7 +240,7 @@ def _write(
     for name, table in raw.tables.items():
         if isinstance(table, TextTable) and table.trailing:
             text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            found.append(Finding("trailing-delimiter", "info", text, count=len(table)))
+            found.append(Finding("trailing-delimiter", "info", text))
     findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
     missing = {
         channel.name: int(lacking)
@@ -271,7 +271,7 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
     for (force, wanted), (name, column) in product(forces, sensed):
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
-            yield Finding("target-among-features", "warning", text, channels=(name,), count=1)
+            yield Finding("target-among-features", "warning", text, channels=(name,))
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict[str, MappedStream]) -> RecordingMeta:

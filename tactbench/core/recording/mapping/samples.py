@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -91,12 +91,6 @@ def times(table: Table, time: Time) -> IntArray:
                 hint="Correct `wraps_at` under `time`.",
             )
         stamps = stamps + period * np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -period / 2)
-    elif period := wrap_period(stamps, (unit,)):
-        raise MappingError(
-            f"{table.where(np.argmax(np.diff(stamps) < 0) + 1)}: column {time.column!r} begins at 0 again, as a full "
-            "counter does.",
-            hint=f"Write `wraps_at: {period // unit}` under `time`.",
-        )
     years = 1970 + stamps / _NS_PER_YEAR
     # Anything below a year after 1970 is a clock that starts at zero, not one of that epoch.
     for row in np.flatnonzero((years < YEARS[0] + 1) | (years > YEARS[1])) if time.epoch == "unix" else ():
@@ -105,24 +99,6 @@ def times(table: Table, time: Time) -> IntArray:
             hint="Correct the unit, or write `epoch: start` or `epoch: unknown`.",
         )
     return stamps + round(time.offset_s * 1e9)
-
-
-def wrap_period(t_ns: IntArray, units_ns: Sequence[int] = (1, 10**3, 10**6, 10**9)) -> int:
-    """Return the period [ns] of a clock that runs backwards because its counter begins at 0 again; 0 for another clock.
-
-    The counter has 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps,
-    or a sixteenth of its range, below its end to within as many above 0.
-    """
-    steps = np.diff(t_ns)
-    back = np.flatnonzero(steps < 0)
-    if not len(back) or not (steps > 0).any():
-        return 0
-    before, after, near = t_ns[back], t_ns[back + 1], 20 * float(np.median(steps[steps > 0]))
-    for period in (unit * 2**bits for unit in units_ns for bits in (16, 24, 32)):
-        least = max(period - near, period * 15 / 16)
-        if ((least <= before) & (before < period) & (after >= 0) & (after <= period - least)).all():
-            return int(period)
-    return 0
 
 
 def _labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
@@ -180,10 +156,8 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
     late, early = max(spans, key=lambda name: spans[name][0]), min(spans, key=lambda name: spans[name][1])
     common = spans[early][1] - spans[late][0]
     if common < 0:
-        shown = "; ".join(
-            f"{tables[name].shown} (table {name!r}) from {' to '.join(_moment(mapping.tables[name], spans[name]))}"
-            for name in (early, late)
-        )
+        dated = {name: [f"{np.datetime64(t_ns, 'ns')}" for t_ns in spans[name]] for name in (early, late)}
+        shown = "; ".join(f"{tables[name].shown} (table {name!r}) {' to '.join(span)}" for name, span in dated.items())
         raise MappingError(
             f"Joined by their clocks, two tables have no time in common: {shown}; {-common * 1e-9:.6g} s lie between.",
             hint="If one clock is off by a known time, write it as `offset_s` under the `time` of its table.",
@@ -200,12 +174,6 @@ def _kind(source: TableSource) -> str:
     assert time is not None
     logged = isinstance(source.read, Bag) and time.column in MESSAGE_TIMES
     return f"{time.column if logged else 'a column'} (epoch {time.epoch})"
-
-
-def _moment(source: TableSource, times_ns: tuple[int, int]) -> Iterator[str]:
-    for t_ns in times_ns:
-        dated = source.time is not None and source.time.epoch == "unix"
-        yield f"{np.datetime64(t_ns, 'ns').astype('datetime64[ms]')}Z" if dated else f"{t_ns * 1e-9:.3f} s"
 
 
 def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
@@ -241,10 +209,11 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
             found.setdefault(text, {})[channel] = int((given[:, channel] == value).sum())
             given[given[:, channel] == value, channel] = np.nan
     for text, counts in found.items():
-        names, count = tuple(stream.channels[place].spec.name for place in sorted(counts)), sum(counts.values())
-        share = float(f"{100 * count / (len(names) * len(given)):.1g}")  # one text for shares that differ by chance
+        names = tuple(stream.channels[place].spec.name for place in sorted(counts))
+        percent = 100 * sum(counts.values()) / (len(names) * len(given))
+        share = float(f"{percent:.1g}")  # one text for shares that differ by chance
         message = f"{listed(names)}: {text.format(share)}"
-        yield Finding("no-reading", "warning", message, stream.spec.name, names, count)
+        yield Finding("no-reading", "warning", message, stream.spec.name, names)
 
 
 def _jumps(column: FloatArray, period: int) -> int:
