@@ -32,7 +32,7 @@ from pathlib import Path
 import numpy as np
 import trivial
 
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import write_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
 
@@ -179,9 +179,8 @@ def record(shelf: Path, name: str, role: str, X: np.ndarray, y: np.ndarray) -> N
     about = RecordingMeta(name=f"{name}-{role}", sensor=sensor, rig="made", session=role, role=role)
     path = shelf / f"{name}-{role}.h5"
     path.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingWriter(path, about) as writer:
-        writer.append(Block("taxels", np.arange(len(X), dtype=np.int64) * 10_000_000, X))
-        writer.annotate("taxels", "class", y)
+    taxels = Block("taxels", np.arange(len(X), dtype=np.int64) * 10_000_000, X)
+    write_recording(path, about, [taxels], {"taxels": {"class": np.asarray(y)}})
 
 
 def seconds(command: list[str], folder: Path) -> float:

@@ -18,7 +18,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.mapping.files import RawRecording
 from tactbench.core.recording.mapping.importing import import_arrays
 from tactbench.core.recording.mapping.model import Mapping
-from tactbench.core.recording.mapping.table import ColumnTable
+from tactbench.core.recording.mapping.table import Table
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, VectorTarget
 from tactbench.recordings import Recording
@@ -134,7 +134,7 @@ def from_arrays(
     labels, raws = columns["groups"].astype(np.str_), []
     for place, label in enumerate(dict.fromkeys(labels.tolist())):
         mine: dict[int | str, Any] = dict(enumerate(rows[labels == label].T))
-        table = ColumnTable(f"group {label!r}", tuple(mine), range(int((labels == label).sum())), mine)
+        table = Table(f"group {label!r}", tuple(mine), range(int((labels == label).sum())), mine)
         raws.append(RawRecording({"rows": table}, {"session": label, "name": f"group-{place}"}, ("arrays",)))
     about = {"rig": "arrays", "simulated": simulated, "clock": "simulated" if time and simulated else mapping.clock}
     folder = Path(mkdtemp(prefix="tactbench-arrays-"))

@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RigError, UnwritableError
 from tactbench.core.plugins.interfaces import RecordingRequest
+from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import PlanEntry, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor

@@ -30,7 +30,7 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
-    from tactbench.core.recording import salvage as unfinished
+    from tactbench.core.recording import partial as unfinished
     from tactbench.core.recording.reader import open_recording
 
     if rescue is not None:

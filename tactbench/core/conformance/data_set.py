@@ -39,14 +39,12 @@ def tasks_can_be_answered(subject: Subject) -> None:
     sensed = {channel.kind for one in streams if one.of == "sensor" for channel in one.channels}
     known = {channel.kind for one in streams if one.of == "reference" for channel in one.channels}
     labels = {*mapping.recording.labels, *(label for one in streams for label in one.annotations)}
-    own = {one.name for one in mapping.tasks}
+    own = {one.name: one.spec for one in mapping.tasks}
     for name in () if mapping.source is None else mapping.source.tasks:
-        if name in own:  # the import looks at these
-            continue
-        if name not in subject.registry.tasks:
+        if name not in own and name not in subject.registry.tasks:
             close = nearest(name, {*own, *subject.registry.tasks.names()})
             fail("source.tasks", f"there is no task {name!r}{f'; did you mean {close[0]}?' if close else ''}")
-        spec: TaskSpec = subject.registry.tasks[name].spec
+        spec: TaskSpec = own[name] if name in own else subject.registry.tasks[name].spec
         if isinstance(spec.target, LabelTarget) and spec.target.name not in labels:
             there = ", ".join(labels) or "none"
             fail("source.tasks", f"{name} asks for the label {spec.target.name}; there is {there}")

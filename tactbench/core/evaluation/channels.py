@@ -137,15 +137,11 @@ def require_forward(data: StreamData, recording: str) -> None:
     steps = np.diff(data.t_ns)
     backward = int((steps < 0).sum())
     if backward or not steps.any():
-        from tactbench.core.recording.mapping.samples import wrap_period
-
         what = f"runs backwards {backward} times" if backward else "stands still"
-        step = "sort the rows before they are imported, or record again."
-        if wrap_period(data.t_ns):
-            step = "a full counter begins at 0 again: import with `wraps_at` under `time`."
         raise DataError(
             f"In recording {recording!r}, the time of {data.spec.name} {what}.",
-            hint=f"See where with `tactbench inspect`; {step}",
+            hint="See where with `tactbench inspect`. Rows of a counter that begins at 0 again must not be sorted: import them "
+            "with `wraps_at` under `time`; sort others before they are imported.",
         )
 
 

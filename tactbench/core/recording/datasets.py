@@ -137,8 +137,7 @@ class DataSet:
             except OSError as error:
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
-                    f"{self.name}: {origin} could not be fetched{missed}: {_reason(error)}. "
-                    f"Its files belong into {self.files}.",
+                    f"{self.name}: {origin} could not be fetched{missed}: {error}. Its files belong into {self.files}.",
                     hint="Put them there by hand, or name a folder that holds a copy as `root` (--root DIR). "
                     "What was fetched before is kept.",
                 ) from error
@@ -228,11 +227,3 @@ def _copying(copy: Path) -> Callable[[str, str, Any], None]:
         shutil.copyfile(copy / url.removeprefix(there.base_url), output_file)
 
     return download
-
-
-def _reason(error: OSError) -> str:
-    """Return the cause in a few words; the message of an HTTP library lists all attempts to connect."""
-    response = getattr(error, "response", None)
-    if response is not None:
-        return f"the server answers {response.status_code}"
-    return error.strerror or ("no connection" if type(error).__module__.startswith("requests") else str(error))

@@ -29,18 +29,15 @@ ROWS, CHANNELS = "row", "channel"
 """Names of the dimension scales of a stream: of its rows where it has no clock, and of its channels. They are no part
 of the digest."""
 CHUNK_ROWS = 1024
-MAX_LISTED_CHANNELS = 1000
-"""Most channels of which a stream has attributes, as an attribute of HDF5 holds 64 KiB at most; the meta has all."""
 
 SEE = "See docs/format.md."
 
-
-def not_content(version: int) -> tuple[str, ...]:
-    """Return the fields of the meta that are not part of the content digest.
-
-    The rig computes `plan` and `drawn` on the way to the samples: processors may differ in their last bit.
-    """
-    return ("provenance",) if version < 3 else ("name", "plan", "drawn", "provenance")
+Annotations = dict[str, dict[str, npt.NDArray[Any]]]
+"""Labels of rows by stream and name: (n,) texts or whole numbers."""
+Columns = dict[str, npt.NDArray[Any]]
+"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
+Blocks = Iterable[tuple[str, Columns]]
+"""Stream and columns of each block, in the order of arrival."""
 
 
 @contextmanager
@@ -84,9 +81,9 @@ class ContentDigest:
     """
 
     def __init__(self, text: str, version: int = VERSION) -> None:
-        content = json.loads(text)
-        for name in not_content(version):
-            content.pop(name, None)
+        # The rig computes `plan` and `drawn` on the way to the samples: processors may differ in their last bit.
+        left_out = ("provenance",) if version < 3 else ("name", "plan", "drawn", "provenance")
+        content = {name: value for name, value in json.loads(text).items() if name not in left_out}
         self._version = version
         self._columns: dict[tuple[str, str, tuple[int, ...]], tuple[Any, list[int]]] = {}
         """SHA-256 and number of the rows so far, by name, type and shape of a row."""
@@ -120,14 +117,6 @@ class ContentDigest:
 def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
     """Return the streams that a recording may hold: those of the sensor and those of the reference."""
     return {stream.name: stream for stream in (*meta.sensor.streams, *meta.reference)}
-
-
-def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
-    """Yield the attributes that let an ordinary HDF5 viewer name the columns."""
-    if len(spec.channels) > MAX_LISTED_CHANNELS:
-        return
-    yield "channel_names", [channel.name for channel in spec.channels]
-    yield "channel_units", [channel.unit for channel in spec.channels]
 
 
 def partial_path(path: Path, attempt: int = 1) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +48,7 @@ _UNTIMED = {
 }
 FINDINGS = "findings"
 """Key of the provenance under which an import stores its findings."""
+FIELDS = ("check", "severity", "message", "stream", "channels")
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
 """Checks that mark no score. Taxels without a touch are constant and alike, and those pressed hard saturate; from
 `dead` on, an evaluation that needs the missing data refuses the recording or reports it itself."""
@@ -68,8 +69,6 @@ class Finding:
     stream: str = ""
     """Name of the stream; empty: the whole recording is concerned."""
     channels: tuple[str, ...] = ()
-    count: int = 0
-    """Number of samples, rows or channels that are concerned."""
 
 
 class _Stream:
@@ -83,7 +82,6 @@ class _Stream:
         self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
         self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
         self.lost_before = 0
-        self.labels: dict[str, set[Any]] = {name: set() for name in stream.annotations}
         digests = [hashlib.sha256() for _ in channels]
         bottom, top = np.array([_ends(one) for one in channels]).T
         for block in stream.blocks():
@@ -97,8 +95,6 @@ class _Stream:
             self.high = np.maximum(self.high, values.max(axis=0, initial=-np.inf, where=~missing))
             for digest, column in zip(digests, np.ascontiguousarray(values.T), strict=True):
                 digest.update(column.data)
-            for name, column in block.annotations.items():
-                self.labels[name] |= set(np.unique(column).tolist())
         self.contents = [digest.digest() for digest in digests]
 
     def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
@@ -114,9 +110,8 @@ class _Stream:
         there = ~missing[:, wanted].any(axis=1)
         return self.t_ns[rows][there], values[there][:, wanted]
 
-    def phrase(self, which: npt.NDArray[Any]) -> str:
-        """Return a phrase for the channels of a mask: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
-        names = self.names(which)
+    def phrase(self, names: Sequence[str]) -> str:
+        """Return a phrase for channels: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
         if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
             return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
         return listed(names)
@@ -167,7 +162,9 @@ def examine(recording: Recording) -> list[Finding]:
             found.append(Finding("empty", "error", f"{name} has no rows", name))
             continue
         found.extend(_channels(stream))
-        found.extend(_rows(stream))
+        if stream.lost_before:
+            text = f"{name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
+            found.append(Finding("rows-before-lost", "warning", text, name))
         if name in recording.meta.clocks:
             found.extend(_clock_fit(name, recording.meta.clocks[name], stream))
         if stream.t_ns is not None:
@@ -180,8 +177,7 @@ def examine(recording: Recording) -> list[Finding]:
         for other, reference in streams.items():
             if name in own and other not in own:
                 found.extend(_late(stream, reference))
-    order = {"error": 0, "warning": 1, "info": 2}
-    return sorted(found, key=lambda finding: order[finding.severity])
+    return sorted(found, key=lambda finding: get_args(Severity).index(finding.severity))
 
 
 def marking(recording: Recording) -> list[Finding]:
@@ -192,7 +188,8 @@ def marking(recording: Recording) -> list[Finding]:
     meta = recording.meta
     if FINDINGS in meta.provenance:
         with layout.readable(recording.path):
-            found = [Finding(**one) for one in meta.provenance[FINDINGS]]
+            # Earlier imports stored a count beside these.
+            found = [Finding(*(one[name] for name in FIELDS)) for one in meta.provenance[FINDINGS]]
     else:
         found = [] if meta.simulated and meta.emulation is None else examine(recording)
     return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
@@ -201,85 +198,66 @@ def marking(recording: Recording) -> list[Finding]:
 def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
-        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}", count=1)
+        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}")
     if meta.clock in _UNTIMED:
         yield Finding("no-clock", "info", _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
     if absent:
-        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}", count=len(absent))
+        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}")
 
 
 def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
-    lost = [f"{counts.gaps} never came"] if counts.gaps else []
-    lost += [f"{counts.dropped} were dropped because writing was behind"] if counts.dropped else []
-    if lost:
-        text = f"{stream} lost rows: {', '.join(lost)}"
-        yield Finding("lost", "warning", text, stream, count=counts.gaps + counts.dropped)
     again = counts.duplicates + counts.late
-    if again:
-        text = f"{stream}: {again} rows came twice or late, and were kept out"
-        yield Finding("repeated", "info", text, stream, count=again)
     open_rows = counts.received - counts.written - counts.dropped - again
-    if open_rows:
-        text = f"{stream}: {abs(open_rows)} rows {'more' if open_rows > 0 else 'fewer'} received than accounted for"
-        yield Finding("unaccounted", "warning", text, stream, count=abs(open_rows))
+    lost = f"{counts.gaps} rows never came, {counts.dropped} were dropped because writing was behind"
+    kinds: tuple[tuple[str, Severity, int, str], ...] = (
+        ("lost", "warning", counts.gaps + counts.dropped, lost),
+        ("repeated", "info", again, f"{again} rows came twice or late, and were kept out"),
+        ("unaccounted", "warning", open_rows, f"{open_rows} more rows were received than are accounted for"),
+    )
+    yield from (Finding(check, kind, f"{stream}: {text}", stream) for check, kind, count, text in kinds if count)
 
 
 def _channels(stream: _Stream) -> Iterator[Finding]:
     there = stream.rows - stream.missing
 
-    def finding(check: str, severity: Severity, which: npt.NDArray[np.bool_], text: str, count: int = 0) -> Finding:
+    def finding(check: str, severity: Severity, which: npt.NDArray[Any], text: str) -> Iterator[Finding]:
         names = stream.names(which)
-        return Finding(check, severity, f"{stream.phrase(which)}{text}", stream.name, names, count or len(names))
+        if names:
+            yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names)
 
     dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
-    stuck = (there > 1) & ~varies
-    if dead.any():
-        yield finding("dead", "error", dead, " without a single sample")
-    if stuck.any():
-        yield finding("stuck", "warning", stuck, " constant")
-    full = np.flatnonzero(stream.saturated)
-    for places in [full] if len(full) > MOST_LISTED else full[:, None]:
-        some, count = np.isin(np.arange(len(there)), places), int(stream.saturated[places].sum())
-        yield finding(
-            "saturated", "warning", some, f" saturated in {count} of {len(places) * stream.rows} samples", count
-        )
+    yield from finding("dead", "error", dead, "without a single sample")
+    yield from finding("stuck", "warning", (there > 1) & ~varies, "constant")
+    saturated, places = stream.saturated > 0, np.arange(len(there))
+    for which in [saturated] if saturated.sum() > MOST_LISTED else saturated & np.eye(len(there), dtype=bool):
+        count, samples = int(stream.saturated[which].sum()), int(which.sum()) * stream.rows
+        yield from finding("saturated", "warning", which, f"saturated in {count} of {samples} samples")
     for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
-        text = f" without a sample in {count} of {stream.rows} rows"
-        yield finding("missing", "info", stream.missing == count, text, count)
-    if stream.suspect.any():
-        count = int(stream.suspect.sum())
-        text = f": {count} samples failed parity, checksum or sequence"
-        yield finding("suspect", "warning", stream.suspect > 0, text, count)
+        yield from finding(
+            "missing", "info", stream.missing == count, f"without a sample in {count} of {stream.rows} rows"
+        )
+    text = f"in {stream.suspect.sum()} samples with a failed parity, checksum or sequence"
+    yield from finding("suspect", "warning", stream.suspect > 0, text)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
     for place in np.flatnonzero(varies).tolist():
         alike.setdefault(stream.contents[place], []).append(place)
-    for places in alike.values():
-        if len(places) > 1:
-            yield finding("duplicated", "warning", np.isin(np.arange(len(there)), places), " identical")
-
-
-def _rows(stream: _Stream) -> Iterator[Finding]:
-    for label, values in stream.labels.items():
-        if len(values) == 1 and stream.rows > 1:
-            text = f"label {label} is {next(iter(values))!r} in every row"
-            yield Finding("constant-label", "info", text, stream.name, count=stream.rows)
-    if stream.lost_before:
-        text = f"{stream.name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
-        yield Finding("rows-before-lost", "warning", text, stream.name, count=stream.lost_before)
+    for some in alike.values():
+        if len(some) > 1:
+            yield from finding("duplicated", "warning", np.isin(places, some), "identical")
 
 
 def _clock_fit(name: str, clock: StreamClock, stream: _Stream) -> Iterator[Finding]:
-    lasts_ns = 0 if stream.t_ns is None else int(stream.t_ns[-1]) - int(stream.t_ns[0])
+    lasts_ns = 0 if stream.t_ns is None else int(stream.t_ns[-1] - stream.t_ns[0])
     wrong = [refused for one in clock.segments if (refused := wrong_rate(name, one.drift, lasts_ns))]
     if wrong:
-        yield Finding("clock-rate", "error", wrong[0], name, count=len(wrong))
+        yield Finding("clock-rate", "error", wrong[0], name)
     if clock.breaks:
         text = f"the clock of {name} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", text, name, count=clock.breaks)
+        yield Finding("clock-lost", "warning", text, name)
 
 
 def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
@@ -289,11 +267,11 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     backward, doubled = int((steps < 0).sum()), int((steps == 0).sum())
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
-        text = f"time runs backwards {backward} times in {stream}, first at row {row}"
-        yield Finding("backward", "error", text, stream, count=backward)
+        text = f"time runs backwards {backward} times in {stream}, first at row {row}; a full counter: `wraps_at`?"
+        yield Finding("backward", "error", text, stream)
     if doubled:
         text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the one before"
-        yield Finding("repeated-time", "warning", text, stream, count=doubled)
+        yield Finding("repeated-time", "warning", text, stream)
     steps.sort()  # in place: there may be tens of millions
     forward = steps[backward + doubled :]
     if len(forward) < 3:
@@ -302,7 +280,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     gaps = len(forward) - int(np.searchsorted(forward, 1e9 * GAP * median, side="right"))
     if gaps:
         text = f"{gaps} gaps in {stream}: up to {1e-9 * forward[-1]:.3g} s, where the median step is {median:.3g} s"
-        yield Finding("gaps", "warning", text, stream, count=gaps)
+        yield Finding("gaps", "warning", text, stream)
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
     if high - low > JITTER * median:
         text = (
@@ -336,10 +314,10 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
     if lags:
         text = ", ".join(
             f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
-            f"{reference.phrase(forces)}{place}"
+            f"{reference.phrase(reference.names(forces))}{place}"
             for place, (late, error) in lags
         )
-        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces), sensor.rows)
+        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces))
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:

@@ -16,22 +16,24 @@ from tactbench.core.errors import FormatError, UnwritableError
 from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
-from tactbench.core.recording.partial import Annotations, Blocks, Columns
+from tactbench.core.recording.format import Annotations, Blocks, Columns
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
+
+MOST_LISTED = 1000
+"""Most channels of which a stream has attributes, as an attribute of HDF5 holds 64 KiB at most; the meta has all."""
 
 
 def store(
     target: Path,
     meta: RecordingMeta,
-    text: str,
     blocks: Blocks,
     annotations: Annotations,
     *,
     aside: Path,
-    replace: bool,
-    sync: bool,
+    replace: bool = False,
+    sync: bool = True,
 ) -> str:
     """Write a recording beside its place, read it back and rename it to `target`; return its content digest.
 
@@ -39,8 +41,8 @@ def store(
 
     Parameters
     ----------
-    meta, text
-        What the recording says about itself, its clock fits included, and the same as text.
+    meta
+        Description of the recording, its clock fits included.
     blocks
         As they came; their times are put on the host's clock here.
     aside
@@ -58,7 +60,8 @@ def store(
     """
     try:
         with writable(target):
-            image = build(meta, text, blocks, annotations, complete=True)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            image = build(meta, blocks, annotations, complete=True)
             with aside.open("wb") as file:
                 file.write(image)
                 file.flush()
@@ -74,8 +77,12 @@ def store(
             if not replace:
                 require_free(target)
             aside.replace(target)
-            if sync:
-                _sync_folder(target.parent)
+            if sync and os.name != "nt":  # folders cannot be opened there
+                folder = os.open(target.parent, os.O_RDONLY)
+                try:
+                    os.fsync(folder)
+                finally:
+                    os.close(folder)
     finally:
         with suppress(OSError):
             aside.unlink(missing_ok=True)
@@ -88,15 +95,15 @@ def require_free(path: Path) -> None:
         raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
 
 
-def build(meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
+def build(meta: RecordingMeta, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
     """Return an HDF5 file with all blocks, as for `store`. Its digest is of the blocks, before HDF5 has them."""
-    return hdf5_image(lambda file: _fill(file, meta, text, blocks, annotations, complete=complete))
+    return hdf5_image(lambda file: _fill(file, meta, blocks, annotations, complete))
 
 
-def _fill(
-    file: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool
-) -> None:
+def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotations, complete: bool) -> None:
     import h5py
+
+    text = layout.meta_text(meta)
 
     file.attrs["format"] = layout.FORMAT
     file.attrs["format_version"] = layout.VERSION
@@ -117,16 +124,6 @@ def _fill(
             _annotate(streams[name], label, kept)
         _describe(streams[name], specs[name])
     file.attrs["content_sha256"] = digest.hexdigest()
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name == "nt":  # folders cannot be opened there
-        return
-    opened = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)
 
 
 def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
@@ -156,10 +153,8 @@ def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
         if rows[stream] >= layout.piece_rows(columns["data"].shape[1]):
             joined, whole = _joined(waiting[stream]), rows[stream] // layout.CHUNK_ROWS * layout.CHUNK_ROWS
             yield stream, {name: values[:whole] for name, values in joined.items()}
-            waiting[stream], rows[stream] = (
-                [{name: values[whole:] for name, values in joined.items()}],
-                rows[stream] - whole,
-            )
+            waiting[stream] = [{name: values[whole:] for name, values in joined.items()}]
+            rows[stream] -= whole
     for stream, some in waiting.items():
         yield stream, _joined(some)
 
@@ -207,23 +202,22 @@ def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
 def _describe(group: Any, spec: StreamSpec) -> None:
     """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
-    attributes = group.attrs
-    attributes["NX_class"] = "NXdata"
-    attributes["signal"] = "data"
+    names, units = zip(*((channel.name, channel.unit) for channel in spec.channels), strict=True)
+    attributes: dict[str, Any] = {"NX_class": "NXdata", "signal": "data"}
     if spec.rate_hz is not None:
         attributes["rate_hz"] = spec.rate_hz
     if "t_ns" in columns:
         attributes["axes"] = ["t_ns", "."]
     for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
         columns[name].attrs["units"] = "ns"
-    units = {channel.unit for channel in spec.channels}
-    columns["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
-    for name, values in layout.channel_attributes(spec):
-        attributes[name] = values
-    _attach_scales(group, columns, [channel.name for channel in spec.channels])
+    columns["data"].attrs["units"] = units[0] if len({*units}) == 1 else "mixed: see channel_units"
+    if len(names) <= MOST_LISTED:
+        attributes |= {"channel_names": names, "channel_units": units}
+    group.attrs.update(attributes)
+    _attach_scales(group, columns, names)
 
 
-def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
+def _attach_scales(group: Any, columns: dict[str, Any], names: tuple[str, ...]) -> None:
     """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.

@@ -1,4 +1,4 @@
-"""Journal of a recording that is being made, which can be read at every moment, also after ``kill -9``.
+"""Journal of a recording that is being made, which can be read at every moment, also after ``kill -9``; its rescue.
 
 An HDF5 file cannot be that: between two flushes its chunks and their index disagree, and a process killed there leaves
 a file of which the last chunks, or all of it, cannot be read.
@@ -7,9 +7,7 @@ A frame is a head of 16 bytes, little-endian (uint32 length of the JSON, uint64 
 both), the JSON, the body. The first frame's JSON is the meta, without body; every other one is
 
 - ``[stream, [[column, type, shape], ...]]``: a block, whose body is its columns, little-endian, in that order;
-- ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body;
-- ``{"annotation": [stream, label, type]}``: a label for every row of the stream, after its last block: ``<i8``, or
-  ``text``, a JSON list.
+- ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body.
 
 ``tactbench-partial 1``, which has blocks alone, without ``device_ns``, is read.
 """
@@ -21,7 +19,8 @@ import json
 import os
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,20 +30,26 @@ import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, MissingRecordingError
 from tactbench.core.files import try_lock
-from tactbench.core.recording.format import canonical, partial_path, readable
+from tactbench.core.recording import image
+from tactbench.core.recording.clock_fit import with_clock_fits
+from tactbench.core.recording.format import (
+    Blocks,
+    Columns,
+    canonical,
+    completing_path,
+    meta_text,
+    partial_path,
+    readable,
+)
+from tactbench.core.recording.reader import Recording, parse_meta
+from tactbench.core.spec.recording import RecordingMeta
 
 MAGIC = b"tactbench-partial 2\n"
 _READ = (b"tactbench-partial 1\n", MAGIC)
 _FRAME = struct.Struct("<IQI")
 """Head of a frame: length of its JSON, length of its body, CRC-32 of both."""
 
-Annotations = dict[str, dict[str, npt.NDArray[Any]]]
-"""Labels of rows by stream and name: (n,) texts or whole numbers."""
-Columns = dict[str, npt.NDArray[Any]]
-"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
-
-Blocks = Iterable[tuple[str, Columns]]
-"""Stream and columns of each block, in the order of arrival."""
+REMARK = "Rescued: the recording broke off and is not whole."
 
 
 class Partial:
@@ -91,14 +96,6 @@ class Partial:
         """Add fields that replace those of the meta, as plain data; raises ValueError for NaN and infinity."""
         self._write(_frame(json.dumps({"meta": changes}, allow_nan=False).encode(), b""))
 
-    def annotate(self, stream: str, name: str, column: npt.NDArray[Any]) -> None:
-        """Add a label for every row of a stream."""
-        if column.dtype.kind == "U":
-            kind, body = "text", json.dumps(column.tolist()).encode()
-        else:
-            kind, body = "<i8", column.astype("<i8").tobytes()
-        self._write(_frame(json.dumps({"annotation": [stream, name, kind]}).encode(), body))
-
     def close(self) -> None:
         """Close the journal and leave it where it is."""
         os.close(self._file)
@@ -117,51 +114,97 @@ class Partial:
 
 
 @dataclass(frozen=True)
-class Journal:
+class _Journal:
     """Content of a journal when it was read; it may have grown since."""
 
     path: Path
-    text: str
-    """The latest meta, as JSON."""
-    annotations: Annotations
+    meta: RecordingMeta
+    """The latest meta."""
     end: int
     """Length of the whole frames [bytes]."""
 
-    def blocks(self) -> Iterator[tuple[str, Columns]]:
+    def blocks(self) -> Blocks:
         """Yield the stream and the columns of each block."""
         return read_blocks(self.path, self.end)
 
+    def fitted(self, **changes: Any) -> RecordingMeta:
+        """Return the meta with changes, and with clock fits and counts of rows from the blocks."""
+        rows: Counter[str] = Counter()
 
-def read_journal(path: Path) -> Journal:
-    """Return the content of a journal, as far as its frames are whole.
+        def counted() -> Blocks:
+            for stream, columns in self.blocks():
+                rows[stream] += len(columns["data"])
+                yield stream, columns
+
+        fitted = with_clock_fits(self.meta.model_copy(update=changes), counted())
+        streams = {name: counts.model_copy(update={"written": rows[name]}) for name, counts in fitted.streams.items()}
+        return fitted.model_copy(update={"streams": streams})
+
+
+def salvage(path: Path) -> Recording:
+    """Open an unfinished recording (``….partial``), in which every block can be read that had been written.
+
+    It may still be growing: the recording has the blocks of this moment.
 
     Raises
     ------
     MissingRecordingError
         If there is no such file.
     FormatError
-        If it is no journal, or broke off before the end of its first frame.
+        If it is not an unfinished recording.
     """
+    import h5py
+
+    journal = _read(path)
+    meta = journal.fitted()
+    file = image.build(meta, journal.blocks(), {}, complete=False)
+    recording = Recording(path, h5py.File(h5py.h5f.open_file_image(file)), meta_text(meta), complete=False)
+    recording.verify()
+    return recording
+
+
+def rescue(path: Path, target: Path) -> None:
+    """Convert an unfinished recording into a finished one at `target`, excluded from evaluations since it broke off.
+
+    The unfinished one stays where it is.
+
+    Raises
+    ------
+    MissingRecordingError
+        If there is no such file.
+    FormatError
+        If it is not an unfinished recording.
+    RecordingError
+        If `target` exists, or cannot be written.
+    """
+    image.require_free(target)
+    journal = _read(path)
+    excluded = journal.meta.excluded or "interrupted: it broke off, and was rescued"
+    meta = journal.fitted(remarks=(*journal.meta.remarks, REMARK), excluded=excluded)
+    image.store(target, meta, journal.blocks(), {}, aside=completing_path(target))
+
+
+def _read(path: Path) -> _Journal:
+    """Return the content of a journal, as far as its frames are whole; raises as :func:`salvage`."""
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     frames = _frames(path, path.stat().st_size)
-    meta, _, end = next(frames, (b"", b"", 0))
+    text, _, end = next(frames, (b"", b"", 0))
     if not end:
         raise FormatError(
             f"{path} is not an unfinished recording, or broke off at once.",
             hint="A finished one is read without `--salvage`.",
         )
-    annotations: Annotations = {}
     with readable(path):
-        content = json.loads(meta)
-        for head, body, place in frames:
-            end = place
-            if head.startswith(b"{"):
-                _take(json.loads(head), body, content, annotations)
-        return Journal(path, canonical(content), annotations, end)
+        content = json.loads(text)
+        for head, _, place in frames:
+            end, frame = place, json.loads(head)
+            if "meta" in frame:
+                content.update(frame["meta"])
+        return _Journal(path, parse_meta(path, canonical(content)), end)
 
 
-def read_blocks(path: Path, end: int | None = None) -> Iterator[tuple[str, Columns]]:
+def read_blocks(path: Path, end: int | None = None) -> Blocks:
     """Yield the blocks in the first `end` bytes of a journal; raises FormatError for one that makes no sense."""
     frames = _frames(path, path.stat().st_size if end is None else end)
     next(frames, None)
@@ -203,12 +246,3 @@ def _block(head: Any, body: bytes) -> tuple[str, Columns]:
         columns[str(name)] = flat.reshape(shape)
         start += flat.nbytes
     return str(stream), columns
-
-
-def _take(head: Any, body: bytes, content: dict[str, Any], annotations: Annotations) -> None:
-    if "meta" in head:
-        content.update(head["meta"])
-        return
-    stream, name, kind = head["annotation"]
-    column = np.array(json.loads(body), dtype=np.str_) if kind == "text" else np.frombuffer(body, dtype=kind)
-    annotations.setdefault(str(stream), {})[str(name)] = column

@@ -40,20 +40,17 @@ class LazyStream:
 
     def __getitem__(self, rows: slice) -> StreamData:
         """Return the rows of a slice, reading no others; raises FormatError if they are damaged."""
-        read: dict[str, Any] = {"t_ns": None, "quality": None}
-        notes = {}
-        for name in self._columns:
-            column = self._read(name, rows)
-            if name.startswith(_NOTE):
-                notes[name.removeprefix(_NOTE)] = column
-            else:
-                read[name] = column
+        read: dict[str, Any] = {
+            "t_ns": None,
+            "quality": None,
+            **{name: self._read(name, rows) for name in self._columns},
+        }
+        notes = {name: read.pop(_NOTE + name) for name in self.annotations}
         return StreamData(spec=self.spec, annotations=notes, **read)
 
     def blocks(self) -> Iterator[StreamData]:
         """Yield the whole stream in order, some 16 MiB at a time."""
-        for rows in self._pieces():
-            yield self[rows]
+        return (self[rows] for rows in self._pieces())
 
     def times(self) -> npt.NDArray[np.int64] | None:
         """Return the times alone, (n,) nanoseconds; None where there is no clock."""
@@ -83,7 +80,7 @@ class LazyStream:
 
 
 class Recording:
-    """An open recording, which is a context manager or is closed by :meth:`close`.
+    """An open recording, which is a context manager.
 
     Attributes
     ----------
@@ -115,10 +112,6 @@ class Recording:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
     def stream(self, name: str) -> LazyStream:
@@ -163,7 +156,7 @@ class Recording:
 
 
 class UnwrittenRecording(Recording):
-    """A recording in memory that is examined before it is written."""
+    """A recording in memory that is examined before it is written, without labels of rows."""
 
     def __init__(self, meta: RecordingMeta, streams: Iterable[StreamData]) -> None:
         self.path, self.meta = Path(meta.name), meta
@@ -172,7 +165,6 @@ class UnwrittenRecording(Recording):
         self._opened = {}
         for name in self.stream_names:
             columns = {column: getattr(there[name], column) for column in _COLUMNS}
-            columns |= {_NOTE + label: values for label, values in there[name].annotations.items()}
             kept = {column: values for column, values in columns.items() if values is not None}
             self._opened[name] = LazyStream(self.path, there[name].spec, kept)
 
@@ -192,17 +184,11 @@ def open_recording(path: Path) -> Recording:
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
-        try:
-            # Best effort: some network disks know no locks, and a finished recording never changes.
-            file = h5py.File(path, "r", locking="best-effort")
-        except BlockingIOError:  # another program holds it open for writing
-            file = h5py.File(path, "r", locking=False)
-    except PermissionError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
+        file = h5py.File(path, "r", locking=False)  # some network disks know no locks; a recording never changes
     except (OSError, RuntimeError, ValueError) as error:
         raise FormatError(
-            f"{path} is not an HDF5 file, or it was cut short: {error}.",
-            hint="Get it again from its source; `….partial` files are what a crash left behind.",
+            f"{path} cannot be read, is not an HDF5 file, or was cut short: {error}.",
+            hint="Check its permissions, or get it again; `….partial` files are what a crash left behind.",
         ) from error
     try:
         with layout.readable(path):
@@ -228,27 +214,20 @@ def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> 
     """Return the datasets of a stream by their path in its group; raises FormatError if they contradict the meta."""
     import h5py
 
-    wide = len(spec.channels)
-    meta, known = recording.meta, _COLUMNS if recording.version > 1 else list(_COLUMNS)[:4]
-    columns = {name: group[name] for name in known if name in group}
+    columns = {name: group[name] for name in _COLUMNS if name in group}
     columns |= {_NOTE + name: item for name, item in group.get("annotations", {}).items()}
-
-    def refuse(what: str) -> FormatError:
-        return FormatError(f"In {path}, stream {spec.name!r} {what}.", hint=layout.SEE)
-
+    clock = recording.meta.clock
+    wrong = [] if ("t_ns" in columns) != (clock == "none") else [f"clock {clock!r} beside the columns {[*columns]}"]
     if "data" not in columns or columns["data"].dtype.newbyteorder("=") != np.dtype(spec.dtype):
-        raise refuse(f"holds no data of type {spec.dtype}")
+        wrong.append(f"no data of type {spec.dtype}")
     for name, item in columns.items():
         text = name.startswith(_NOTE) and h5py.check_string_dtype(item.dtype) is not None
         kinds, dimensions = _COLUMNS.get(name, ("iu", 1))
-        shape = (columns["data"].shape[0], wide)[:dimensions]
+        shape = (group["data"].shape[0] if "data" in columns else 0, len(spec.channels))[:dimensions]
         if item.shape != shape or not (text or item.dtype.kind in kinds):
-            raise refuse(f"holds {name} of {item.dtype} in {item.shape}; {shape} is expected")
-    if ("t_ns" not in columns) != (meta.clock == "none"):
-        raise refuse(f"has {'no ' if 't_ns' not in columns else ''}time stamps, but its clock is {meta.clock!r}")
-    fitted = spec.name in meta.clocks and bool(meta.clocks[spec.name].segments)
-    if ("host_ns" in columns) != fitted or (fitted and "device_ns" not in columns):
-        raise refuse("has times that do not go with what the meta says of its clock")
+            wrong.append(f"{name} of {item.dtype} in {item.shape}, where {shape} is expected")
+    if wrong:
+        raise FormatError(f"In {path}, stream {spec.name!r} has {wrong[0]}.", hint=layout.SEE)
     return columns
 
 
@@ -275,8 +254,6 @@ def parse_meta(path: Path, text: str) -> RecordingMeta:
     """Return the meta in a text; raises FormatError, which names `path`, if it is not valid."""
     try:
         return RecordingMeta.model_validate(json.loads(text))
-    except ValidationError as error:
-        what = complaint(error)
     except (ValueError, UsageError) as error:
-        what = str(error)
-    raise FormatError(f"The meta of {path} is not valid: {what}.", hint=layout.SEE)
+        what = complaint(error) if isinstance(error, ValidationError) else str(error)
+        raise FormatError(f"The meta of {path} is not valid: {what}.", hint=layout.SEE) from error

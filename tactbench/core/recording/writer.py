@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
-from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
+from tactbench.core.recording.format import Annotations, Columns
+from tactbench.core.recording.partial import Partial, read_blocks
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -53,7 +54,6 @@ class RecordingWriter:
         self._specs = layout.specs_by_name(meta)
         self.content_digest = ""
         """Content digest, once the recording is complete."""
-        self._annotations: Annotations = {}
         self._optional: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
         self.journal: Path | None = None
@@ -72,9 +72,10 @@ class RecordingWriter:
             if error is None:
                 self.complete()
         except BaseException as failure:
-            self._leave(failure)
+            error = failure
             raise
-        self._leave(error)
+        finally:
+            self._leave(error)
 
     @property
     def _unique(self) -> bool:
@@ -98,7 +99,7 @@ class RecordingWriter:
         if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
-            self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
+            self.path, self.meta, self._blocks(journal), {},
             aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
         )  # fmt: skip
 
@@ -167,19 +168,6 @@ class RecordingWriter:
         with writable(self.path):
             self._partial.append(block.stream, columns)
 
-    def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
-        """Add a label to every row of `stream`: text or whole numbers, one for each row, after its last block.
-
-        Raises
-        ------
-        RecordingError
-            If the disk refuses it; on completion, if there are fewer labels or more than rows.
-        """
-        column = np.asarray(values)
-        with writable(self.path):
-            self._partial.annotate(stream, name, column)
-        self._annotations.setdefault(stream, {})[name] = column
-
 
 def write_recording(
     path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
@@ -211,10 +199,8 @@ def write_recording(
     meta = with_clock_fits(meta, stored)
     if not replace:
         image.require_free(path)
-    with writable(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
     aside = layout.completing_path(path)
-    image.store(path, meta, layout.meta_text(meta), stored, annotations, aside=aside, replace=replace, sync=False)
+    image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
     return meta
 
 
@@ -229,55 +215,37 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
     spec = specs.get(block.stream)
     if spec is None:
         raise RigError(
-            f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(specs))}.",
+            f"A block of stream {block.stream!r} was received; the recording has {', '.join(sorted(specs))}.",
             hint="Declare the stream in the sensor's spec or the rig's reference.",
         )
-    rows, wide = len(block.data), len(spec.channels)
-    for name, values, shape in (
-        ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
-        ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
-    ):  # fmt: skip
-        if values is not None and np.shape(values) != shape:
+    name = f"A block of stream {block.stream!r}"
+    numbers = {"t_ns": block.t_ns, "sequence": block.sequence, "device_ns": block.device_ns}
+    columns = {one: np.asarray(values) for one, values in numbers.items() if values is not None}
+    if block.quality is not None:
+        columns["quality"] = np.asarray(block.quality)
+    for one, values in {"data": block.data, **columns}.items():
+        shape = (len(block.data), len(spec.channels))[: 1 if one in numbers else 2]
+        if np.shape(values) != shape or (one in numbers and values.dtype.kind not in "iu"):
             raise RigError(
-                f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
-                f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
-                hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
-            )
-    of_reference = any(one.name == spec.name for one in meta.reference)
-    for place, channel in enumerate(spec.channels if of_reference else ()):
-        if channel.kind not in ("force", "torque"):
-            continue
-        empty = ~np.isfinite(block.data[:, place])
-        if block.quality is not None:
-            empty &= (block.quality[:, place] & Quality.MISSING) == 0
-        if empty.any():
-            raise RigError(
-                f"The reference {channel.name!r} of {block.stream!r} is NaN in {int(empty.sum())} rows that are not "
-                "marked as missing.",
-                hint="Mark rows without a sample by the quality MISSING.",
+                f"{name} has {one} of {values.dtype} in {np.shape(values)}, where {shape} is expected.",
+                hint="A block is rows by channels, in the order of the stream's spec; times and sequence numbers are "
+                "whole numbers, one a row, never invented.",
             )
     if (block.t_ns is None) != (meta.clock == "none"):
-        has = "no times" if block.t_ns is None else "times"
         raise RigError(
-            f"A block of stream {block.stream!r} has {has}; the recording's clock is {meta.clock!r}.",
+            f"{name} has {'no times' if block.t_ns is None else 'times'}; the recording's clock is {meta.clock!r}.",
             hint="Give every block its times, or state that there is no clock; never invent one.",
         )
-    columns: Columns = {"data": _stored(block.data, spec)}
-    for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
-        if numbers is not None:
-            columns[name] = _whole(np.asarray(numbers), name, spec)
-    if block.quality is not None and block.quality.any():
-        columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
-    return columns
-
-
-def _whole(numbers: npt.NDArray[Any], name: str, spec: StreamSpec) -> npt.NDArray[np.int64]:
-    if numbers.dtype.kind not in "iu":
+    quality = columns.pop("quality", np.zeros(np.shape(block.data), dtype=np.uint8)).astype(np.uint8)
+    learnt = [one.kind in ("force", "torque") and spec in meta.reference for one in spec.channels]
+    if (~np.isfinite(block.data) & ((quality & Quality.MISSING) == 0) & learnt).any():
         raise RigError(
-            f"A block of stream {spec.name!r} has {name} that are no whole numbers: {numbers.dtype}.",
-            hint="Give times as whole nanoseconds and sequence numbers as counted; never invent one.",
+            f"{name} of the reference has a force or torque that is NaN and not marked as missing.",
+            hint="Mark rows without a sample by the quality MISSING.",
         )
-    return numbers.astype(np.int64)
+    flags = {"quality": quality} if quality.any() else {}
+    times = {one: values.astype(np.int64) for one, values in columns.items()}
+    return {"data": _stored(block.data, spec), **times, **flags}
 
 
 def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
@@ -285,10 +253,10 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
     if declared.kind == "f" or data.dtype == declared:
         return data.astype(declared, copy=False)
     limits = np.iinfo(declared)
-    fits = data.dtype.kind in "iuf" and bool(
-        np.all((data >= limits.min) & (data <= limits.max)) and np.array_equal(np.rint(data), data)
-    )
-    if not fits:
+    if (
+        data.dtype.kind not in "iuf"
+        or not ((data >= limits.min) & (data <= limits.max) & (np.rint(data) == data)).all()
+    ):
         raise RigError(
             f"Stream {spec.name!r} stores {spec.dtype}, and a reading does not fit it without loss.",
             hint="Round and clip in the rig, or declare a wider dtype in the sensor's spec.",

@@ -119,9 +119,7 @@ LINE = 1 + PAD.splitlines().index("tasks:")
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("names: [x, y]", "names: [x, z]", "It has x, y"),
         ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
-        ("source: vector, kind: position, names: [x, y], unit: mm", "source: label, name: colour", "the label colour"),
     ],
 )
 def test_what_a_mapping_declares_wrongly_is_refused_with_its_line(pad, old, new, says):

@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import installed
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import (
@@ -39,11 +39,8 @@ def sensor(n_taxels=3, name="made"):
 def write(path, sensor, *blocks, annotations=None, clock="device", **meta):
     """Write a recording of these blocks, and annotations of taxels; return its path."""
     about = RecordingMeta(name=path.stem, sensor=sensor, rig="made", clock=clock, **meta)
-    with RecordingWriter(path, about) as writer:
-        for block in blocks:
-            writer.append(block)
-        for name, values in (annotations or {}).items():
-            writer.annotate("taxels", name, values)
+    notes = {name: np.asarray(values) for name, values in (annotations or {}).items()}
+    write_recording(path, about, blocks, {"taxels": notes})
     return path
 
 

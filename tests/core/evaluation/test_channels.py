@@ -11,18 +11,10 @@ from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 SPEC = StreamSpec(name="taxels", channels=(ChannelSpec(name="t0", kind="taxel", unit="count"),))
 
 
-@pytest.mark.parametrize(
-    ("t_ns", "step"),
-    [
-        ((2**32 - 50_000 + np.arange(10) * 10_000) % 2**32 * 1000, "wraps_at"),
-        (np.array([1, 2, 0, 3]) * 10**9, "sort the rows"),
-    ],
-)
-def test_the_step_fits_what_runs_backwards(t_ns, step):
-    """Sorted, the rows of a counter that wraps would be in a wrong order."""
+def test_a_time_that_runs_backwards_is_refused_and_a_counter_is_not_to_be_sorted():
     with pytest.raises(DataError) as caught:
-        require_forward(StreamData(SPEC, t_ns, np.zeros((len(t_ns), 1)), None), "press")
-    assert [one for one in ("wraps_at", "sort the rows") if one in caught.value.hint] == [step]
+        require_forward(at(1000, 2000, 0, 3000), "press")
+    assert "wraps_at" in caught.value.hint
 
 
 def at(*times_ms):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Block
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.recording import RecordingMeta
@@ -32,12 +32,9 @@ def write(tmp_path):
         times = np.arange(len(data)) * 10_000_000 if t_ns is None else t_ns
         timed = None if meta.clock == "none" else times
         path = tmp_path / f"{meta.name}.h5"
-        with RecordingWriter(path, meta) as writer:
-            writer.append(Block("taxels", timed, data, quality))
-            if force is not None:
-                writer.append(Block("force_torque", timed, force[:, None]))
-            for label, values in (notes or {}).items():
-                writer.annotate("taxels", label, values)
+        blocks = [Block("taxels", timed, data, quality)]
+        blocks += [] if force is None else [Block("force_torque", timed, force[:, None])]
+        write_recording(path, meta, blocks, {"taxels": notes or {}})
         return path
 
     return make

@@ -13,8 +13,8 @@ from tactbench.core.errors import MissingRecordingError, RecordingError
 from tactbench.core.files import try_lock
 from tactbench.core.recording import image
 from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.partial import rescue, salvage
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.salvage import rescue, salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
 from tactbench.rigs.replay import RecordingFolder
@@ -30,7 +30,11 @@ sensor: {name: pad, title: a pad, principle: capacitive, principle_source: {tag:
 clock: none
 tables: {t: {files: "*.csv", read: {format: csv, header: false}}}
 recording: {name: press, session: a}
-streams: {taxels: {table: t, channels: [{columns: [0, 1, 2], name: "t{column}", kind: taxel, unit: count}]}}
+streams:
+  taxels:
+    table: t
+    channels: [{columns: [0, 1, 2], name: "t{column}", kind: taxel, unit: count}]
+    annotations: {object: {column: 0}}
 """
 
 
@@ -40,7 +44,6 @@ def record(folder):
             rows = slice(first, first + 1000)
             flags = np.full((1000, 3), Quality.SUSPECT, dtype=np.uint8) if first else None
             writer.append(Block("taxels", ROWS[rows] * 1000, DATA[rows], flags))
-        writer.annotate("taxels", "object", ["ball"] * len(ROWS))
 
 
 def rescued(folder):
@@ -112,7 +115,7 @@ def test_an_interrupt_at_any_write_leaves_the_right_file_or_none(scene, write):
     [
         *((write, "_extend", "data") for write in (record, rescued, imported)),
         (record, "_extend", "quality"),
-        (record, "_annotate", "annotations/object"),
+        (imported, "_annotate", "annotations/object"),
     ],
 )
 def test_rows_that_are_not_written_are_found_when_they_are_read_back(scene, monkeypatch, write, name, column):

@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
+from tactbench.core.recording.partial import salvage
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.salvage import salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
 from tests.core.recording.conftest import about
@@ -25,7 +25,7 @@ def read_all(path):
 
 @pytest.fixture
 def good(write):
-    return write(DATA, force=np.arange(3000.0), notes={"object": ["ball"] * 3000})
+    return write(DATA, force=np.arange(3000.0), notes={"object": np.repeat("ball", 3000)})
 
 
 @pytest.mark.parametrize("read", [open_recording, salvage])

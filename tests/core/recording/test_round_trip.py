@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tactbench.core.recording.reader import content_digest, open_recording
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import RecordingWriter, write_recording
 from tactbench.core.samples import Block
 from tests.core.recording.conftest import about
 
@@ -44,26 +44,29 @@ def recordings(draw):
 def test_round_trip(made):
     meta, times, data, flags, cuts, notes = made
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "x.h5"
-        with RecordingWriter(path, meta) as writer:
-            for first, last in itertools.pairwise(cuts):
-                part = slice(first, last)
-                marked = flags is not None and flags[part].any()  # quality may begin at any block
-                writer.append(Block("taxels", None if times is None else times[part], data[part],
-                                    flags[part] if marked else None))  # fmt: skip
-            writer.annotate("taxels", "object", notes)
-            writer.annotate("taxels", "press", np.arange(len(data)))
-        with open_recording(path) as recording:
-            recording.verify()
-            assert recording.meta == meta
-            read = recording.read("taxels")
-        # Bytes, not values: NaN and the sign of zero must survive too.
-        assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
-        assert np.array_equal(read.t_ns, times)  # of None too
-        assert np.array_equal(read.quality, flags if flags is not None and flags.any() else None)
-        assert np.array_equal(read.annotations["object"], notes)
-        assert np.array_equal(read.annotations["press"], np.arange(len(data)))
-        assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
+        blocks = []
+        for first, last in itertools.pairwise(cuts):
+            part = slice(first, last)
+            marked = flags is not None and flags[part].any()  # quality may begin at any block
+            blocks.append(Block("taxels", None if times is None else times[part], data[part],
+                                flags[part] if marked else None))  # fmt: skip
+        with RecordingWriter(Path(folder) / "x.h5", meta) as writer:
+            for block in blocks:
+                writer.append(block)
+        labels = {"object": notes, "press": np.arange(len(data))}
+        write_recording(Path(folder) / "y.h5", meta, blocks, {"taxels": labels})
+        for name, expected in (("x.h5", {}), ("y.h5", labels)):
+            with open_recording(Path(folder) / name) as recording:
+                recording.verify()
+                assert recording.meta == meta
+                read = recording.read("taxels")
+            # Bytes, not values: NaN and the sign of zero must survive too.
+            assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
+            assert np.array_equal(read.t_ns, times)  # of None too
+            assert np.array_equal(read.quality, flags if flags is not None and flags.any() else None)
+            assert read.annotations.keys() == expected.keys()
+            assert all(np.array_equal(read.annotations[label], expected[label]) for label in expected)
+        assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5", "y.h5"]
 
 
 def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):

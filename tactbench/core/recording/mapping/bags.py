@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import struct
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tactbench.core.errors import MappingError, did_you_mean
+from tactbench.core.recording.mapping.formats import extra, whole
 from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import ColumnTable, UsedColumns, nanoseconds_per
+from tactbench.core.recording.mapping.table import Table, UsedColumns, nanoseconds_per
 
 MESSAGE_TIMES = ("log_time", "publish_time")
 """Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
 
 
-def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns]]) -> dict[str, ColumnTable]:
+def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns]]) -> dict[str, Table]:
     """Read topics of one bag in one pass; return tables by their name, for each a topic and its columns that are used.
 
     Raises
@@ -38,20 +36,26 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns
     decoders: dict[int, tuple[list[str], Any]] = {}
     schemas: dict[int, Any] = {}
     seen: set[str] = set()
-    for record in _records(path, shown):
-        kind = type(record).__name__
-        if kind == "Message":
-            names, decode = decoders.get(record.channel_id, ((), None))
-            for name in names:
-                topic, used = topics[name]
-                _take(record, decode, used, values[name], f"{shown} {topic}, message {counts[name]}")
-                counts[name] += 1
-        elif kind == "Schema":
-            schemas[record.id] = record
-        elif kind == "Channel" and record.id not in decoders:
-            seen.add(record.topic)
-            names = [name for name, (topic, _) in topics.items() if topic == record.topic]
-            decoders[record.id] = names, names and _decoder(record, schemas.get(record.schema_id), shown)
+    stream, ros = extra("mcap", shown, "mcap.stream_reader", "mcap_ros2.decoder")
+    damaged = whole(
+        shown, "bag", "A recorder that was killed leaves such a bag: `mcap recover` keeps what can be read."
+    )
+    with damaged, path.open("rb") as opened:
+        # The records end at the bag's footer alone: a bag that was cut short has none.
+        for record in stream.StreamReader(opened, validate_crcs=True).records:
+            kind = type(record).__name__
+            if kind == "Message":
+                names, decode = decoders.get(record.channel_id, ((), None))
+                for name in names:
+                    topic, used = topics[name]
+                    _take(record, decode, used, values[name], f"{shown} {topic}, message {counts[name]}")
+                    counts[name] += 1
+            elif kind == "Schema":
+                schemas[record.id] = record
+            elif kind == "Channel" and record.id not in decoders:
+                seen.add(record.topic)
+                names = [name for name, (topic, _) in topics.items() if topic == record.topic]
+                decoders[record.id] = names, names and _decoder(ros, record, schemas.get(record.schema_id), shown)
     tables = {}
     for name, (topic, used) in topics.items():
         if not counts[name]:
@@ -62,36 +66,14 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns
             raise MappingError(
                 f"{shown} {topic}: {time.column} is in nanoseconds.", hint="Write `unit: ns` under `time`."
             )
-        columns = {one: np.array(found) if used.as_float(one) else found for one, found in values[name].items()}
-        tables[name] = ColumnTable(f"{shown} {topic}", used.columns, range(counts[name]), columns, "message")
+        tables[name] = Table(f"{shown} {topic}", used.columns, range(counts[name]), values[name], ", message ")
     return tables
 
 
-def _records(path: Path, shown: str) -> Iterator[Any]:
-    try:
-        stream: Any = importlib.import_module("mcap.stream_reader")
-    except ModuleNotFoundError as error:
-        raise MappingError(f"{shown} is a bag.", hint="Install the extra: pip install 'tactbench[mcap]'.") from error
-    with path.open("rb") as opened:
-        records = iter(stream.StreamReader(opened, validate_crcs=True).records)
-        while True:
-            try:
-                record = next(records)  # ends at the bag's footer alone: one that was cut short has none
-            except StopIteration:
-                return
-            except Exception as error:  # whatever a damaged file makes of the library
-                raise MappingError(
-                    f"{shown} is no whole bag: {type(error).__name__}{f': {error}' if str(error) else ''}.",
-                    hint="A recorder that was killed leaves such a bag: `mcap recover` keeps what can be read.",
-                ) from error
-            yield record
-
-
-def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
+def _decoder(ros: Any, channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
     """Return the decoder of a topic's messages; raises MappingError for an encoding that cannot be read."""
     if channel.message_encoding == "json":
         return json.loads
-    ros: Any = importlib.import_module("mcap_ros2.decoder")
     found: Callable[[bytes], Any] | None = ros.DecoderFactory().decoder_for(channel.message_encoding, schema)
     if found is None:
         raise MappingError(
@@ -107,8 +89,8 @@ def _take(record: Any, decode: Any, used: UsedColumns, values: dict[Column, Any]
     column: Column | None = None
     try:
         message = decode(record.data)
-        for column, path in used.paths:
-            value = getattr(record, str(column)) if column in MESSAGE_TIMES else _field(message, path)
+        for column in used.columns:
+            value = getattr(record, str(column)) if column in MESSAGE_TIMES else _field(message, str(column))
             if used.time is not None and column == used.time.column:
                 value = _stamp(value)
             values[column].append(float(value) if used.as_float(column) else value)
@@ -120,10 +102,13 @@ def _take(record: Any, decode: Any, used: UsedColumns, values: dict[Column, Any]
         ) from error
 
 
-def _field(message: Any, path: tuple[str | int, ...]) -> Any:
-    """Return the value at a path: of fields of ROS 2 messages, keys of JSON and places in arrays."""
-    for part in path:
-        message = message[part] if isinstance(part, int) or isinstance(message, dict) else getattr(message, part)
+def _field(message: Any, path: str) -> Any:
+    """Return the value at a path like ``data.0``: of fields of ROS 2 messages, keys of JSON and places in arrays."""
+    for part in path.split("."):
+        if part.isdecimal():
+            message = message[int(part)]
+        else:
+            message = message[part] if isinstance(message, dict) else getattr(message, part)
     return message
 
 

@@ -12,9 +12,8 @@ from pydantic import ValidationError
 from tactbench.core.errors import MappingError, complaint
 from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamSource
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
-from tactbench.core.spec.quantity import Quantity
 from tactbench.core.spec.recording import Scalar
-from tactbench.core.spec.sensor import SENSOR_NAME, ChannelSpec, SensorSpec, StreamSpec
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 
 _RANGE = re.compile(r"^(?P<before>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
 _WORD = re.compile(r"\{([^{}]*)\}")
@@ -75,13 +74,13 @@ def expand(text: Scalar) -> Iterator[Scalar]:
         yield f"{before}{number}" if before else number
 
 
-def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...], dict[str, MappedStream]]:
-    """Return the sensor, the reference streams, and all streams with their columns; see :func:`device`.
+def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]]:
+    """Return the sensor, and all streams with their columns; words in its name are not filled in yet.
 
     Raises
     ------
     MappingError
-        If names collide, or columns, names and positions differ in number.
+        If names collide, or columns and names differ in number.
     """
     streams: dict[str, MappedStream] = {}
     try:
@@ -101,25 +100,7 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
         raise MappingError(
             f"The sensor of the mapping is not valid: {complaint(error)}.", hint="Correct its streams and channels."
         ) from error
-    reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
-    return sensor, reference, streams
-
-
-def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar], origin: str) -> SensorSpec:
-    """Return the sensor with the name and title that a recording's words give it.
-
-    Raises
-    ------
-    MappingError
-        If a sensor cannot have that name.
-    """
-    name = fill(mapping.sensor.name, words, "sensor.name")
-    if not re.fullmatch(SENSOR_NAME, name):
-        raise MappingError(
-            f"{origin}: {name!r} cannot be the name of a sensor.",
-            hint="Use lower case, digits, - and _; translate words under `words`.",
-        )
-    return sensor.model_copy(update={"name": name, "title": fill(mapping.sensor.title, words, "sensor.title")})
+    return sensor, streams
 
 
 def columns_of(group: ChannelGroup) -> list[Column]:
@@ -130,31 +111,19 @@ def columns_of(group: ChannelGroup) -> list[Column]:
 
 def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
     columns = columns_of(group)
-    names = list(_names(stream, group, columns))
-    if group.positions_m and len(group.positions_m) != len(columns):
-        raise MappingError(
-            f"Stream {stream}: {len(columns)} columns, but {len(group.positions_m)} positions.", hint="Give one each."
-        )
-    rest = None
-    if group.rest is not None and group.rest_source is not None:
-        rest = Quantity(value=group.rest, unit=group.unit, source=group.rest_source)
-    for place, (column, name) in enumerate(zip(columns, names, strict=True)):
-        spec = ChannelSpec(
-            name=name, kind=group.kind, unit=group.unit, lower=group.lower, upper=group.upper, sign=group.sign,
-            rest=rest, position_m=group.positions_m[place] if group.positions_m else None,
-            position_source=group.position_source,
-        )  # fmt: skip
-        yield MappedChannel(spec, column, group)
-
-
-def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[str]:
-    ways = [[*expand(values)] if isinstance(values, str) else list(values) for values in group.over.values()]
-    combinations = list(itertools.product(*ways)) if ways else [()] * len(columns)
+    ways = [[*expand(values)] if isinstance(values, str) else values for values in group.over.values()]
+    combinations = [*itertools.product(*ways)] if ways else [()] * len(columns)
     if len(combinations) != len(columns):
         raise MappingError(
             f"Stream {stream}: {len(columns)} columns, but `over` makes {len(combinations)} names.",
             hint="Correct `columns` or `over`.",
         )
+    rest = {"value": group.rest, "unit": group.unit, "source": group.rest_source}
+    shared = {
+        **group.model_dump(include={"kind", "unit", "lower", "upper", "sign"}),
+        "rest": None if group.rest is None else rest,
+    }
     for column, values in zip(columns, combinations, strict=True):
         words = {"column": column, **dict(zip(group.over, values, strict=True))}
-        yield fill(group.name, words, f"stream {stream}")
+        name = fill(group.name, words, f"stream {stream}")
+        yield MappedChannel(ChannelSpec.model_validate({**shared, "name": name}), column, group)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import listed
-from tactbench.core.recording.mapping.arrays import read_arrays
 from tactbench.core.recording.mapping.bags import read_bag
 from tactbench.core.recording.mapping.channels import columns_of
+from tactbench.core.recording.mapping.formats import read_arrays, read_parquet, read_sheet, require_format
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
-from tactbench.core.recording.mapping.parquet import read_parquet
-from tactbench.core.recording.mapping.sheets import read_sheet
-from tactbench.core.recording.mapping.signatures import require_format
 from tactbench.core.recording.mapping.table import Table, UsedColumns
 from tactbench.core.recording.mapping.text import read_text
 
@@ -27,6 +25,7 @@ OTHER_CASE = "have an ending in another case"
 LINKED_FOLDERS = "are linked folders, which ** does not search"
 FOLDERS = "are folders"
 APPLE_DOUBLE = "are what macOS keeps beside other files (AppleDouble)"
+NO_TABLES = (FOLDERS, APPLE_DOUBLE)
 _SAME_GROUPS = "Give both `path` expressions the same named groups."
 
 
@@ -39,22 +38,19 @@ class FoundFile:
     words: Words = field(compare=False)
 
 
-@dataclass(frozen=True)
-class FileSet:
+class FileSet(NamedTuple):
     """Files that belong together, by their table, and the words of all their paths."""
 
     files: dict[str, FoundFile]
     words: Words
 
 
-@dataclass(frozen=True)
-class RawRecording:
-    """The tables of one recording as they were read, and its words."""
+class RawRecording(NamedTuple):
+    """The tables of one recording as they were read, its words, and the paths of its files below the root folder."""
 
     tables: dict[str, Table]
     words: Words
     files: tuple[str, ...]
-    """Paths below the root folder."""
 
 
 def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
@@ -75,8 +71,8 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
     no_tables: list[str] = []
     for name, source in mapping.tables.items():
         found[name], notes = _matching(name, source, root)
-        left_out += [note for obstacle, note in notes.items() if obstacle in (OTHER_CASE, LINKED_FOLDERS)]
-        no_tables += [note for obstacle, note in notes.items() if obstacle in (FOLDERS, APPLE_DOUBLE)]
+        for obstacle, note in notes.items():
+            (no_tables if obstacle in NO_TABLES else left_out).append(note)
     lead, *others = found
     shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
     by_words: dict[tuple[str, ...], list[FoundFile]] = {}
@@ -84,66 +80,68 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
         for file in found[name]:
             by_words.setdefault((name, *(file.words[word] for word in names)), []).append(file)
     sets: list[FileSet] = []
-    used = set()
     for leader in found[lead]:
         files, words = {lead: leader}, dict(leader.words)
         for name in others:
-            values = [leader.words[word] for word in shared[name]]
-            fitting = by_words.get((name, *values), [])
+            needed = {word: leader.words[word] for word in shared[name]}
+            fitting = by_words.get((name, *needed.values()), [])
             if len(fitting) == 1:
                 files[name], words = fitting[0], {**fitting[0].words, **words}
-                used.add((name, fitting[0].shown))
                 continue
-            what = ", ".join(map(" ".join, zip(shared[name], values, strict=True))) or "no shared words"
-            there = f"are {len(fitting)}: {listed([one.shown for one in fitting], 'files')}" if fitting else "is none"
-            left_out.append(f"{leader.shown} needs one file of table {name!r} ({what}); there {there}.")
+            text = f"{leader.shown} needs one file of table {name!r} with the words {needed}; there are {len(fitting)}."
+            left_out.append(text)
             if fitting:
-                raise MappingError(left_out[-1], hint=_SAME_GROUPS)
+                raise MappingError(text, hint=_SAME_GROUPS)
         if len(files) == len(found):
             sets.append(FileSet(files, words))
     if not sets:
         raise MappingError(left_out[-1], hint=_SAME_GROUPS)
     for name in others:
-        alone = [file.shown for file in found[name] if (name, file.shown) not in used]
+        used = {one.files[name].shown for one in sets}
+        alone = [file.shown for file in found[name] if file.shown not in used]
         left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
     return sets, tuple(left_out), tuple(no_tables)
 
 
-def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
-    """Return the recordings of files that belong together: one, or those of an array or of the values of a column."""
+def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
+    """Yield the recordings of files that belong together: one, or those of an array or of the values of a column."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
-    for name, file in files.files.items():
-        require_format(file.path, file.shown, mapping.tables[name].read.format)
-    (first, source), *_ = mapping.tables.items()
-    if isinstance(source.read, Arrays):
-        file = files.files[first]
-        return [
-            RawRecording({first: array}, {**files.words, **words}, shown)
-            for words, array in read_arrays(file.path, file.shown, source.read, file.words)
-        ]
     tables: dict[str, Table] = {}
     topics: dict[FoundFile, dict[str, tuple[str, UsedColumns]]] = {}
     for name, file in files.files.items():
-        how = mapping.tables[name].read
-        assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
+        how, used = mapping.tables[name].read, used_columns(mapping, name)
+        require_format(file.path, file.shown, how.format)
+        if isinstance(how, Arrays):  # of which the model allows no others beside it
+            for words, array in read_arrays(file.path, file.shown, how, file.words):
+                yield RawRecording({name: array}, {**files.words, **words}, shown)
+            return
         if isinstance(how, Bag):
-            topics.setdefault(file, {})[name] = how.topic, used_columns(mapping, name)
+            topics.setdefault(file, {})[name] = how.topic, used
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         elif isinstance(how, Parquet):
-            tables[name] = read_parquet(file.path, file.shown, used_columns(mapping, name))
+            tables[name] = read_parquet(file.path, file.shown, used)
         else:
             tables[name] = read_text(file.path, file.shown, how)
     for file, wanted in topics.items():
         tables |= read_bag(file.path, file.shown, wanted)
-    lead = tables[first]
-    for name, table in tables.items():
+    tables = {name: tables[name] for name in mapping.tables}
+    lead, *others = tables.values()
+    for table in others:
         if mapping.join is not None and mapping.join.by == "rows" and len(table) != len(lead):
             raise MappingError(
-                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
+                f"{table.shown} has {len(table)} rows, {lead.shown} has {len(lead)}.",
                 hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
             )
-    return list(_split(mapping, RawRecording({name: tables[name] for name in mapping.tables}, files.words, shown)))
+    if not mapping.split_by:
+        yield RawRecording(tables, files.words, shown)
+        return
+    rows_of: dict[tuple[str, ...], list[int]] = {}
+    for row, values in enumerate(zip(*map(lead.texts, mapping.split_by.values()), strict=True)):
+        rows_of.setdefault(values, []).append(row)
+    for values, rows in rows_of.items():
+        words = {**files.words, **dict(zip(mapping.split_by, values, strict=True))}
+        yield RawRecording({name: table.take(rows) for name, table in tables.items()}, words, shown)
 
 
 class Shape(NamedTuple):
@@ -162,19 +160,12 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
             shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name).columns)
         first = shapes[name]
         first.everywhere.update(dict.fromkeys(table.columns))
-        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
-        if by_place and len(table.columns) != len(first.columns):
-            raise MappingError(
-                f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
-                f"(table {name!r}).",
-                hint="Repair the file, import it by another mapping, or name the columns by a header.",
-            )
-        for place in by_place:
-            if table.columns[place] != first.columns[place]:
+        by_place = {one for one in first.used if isinstance(one, int)}
+        for place, (one, other) in enumerate(zip_longest(table.columns, first.columns)):
+            if by_place and one != other and (place in by_place or None in (one, other)):
                 raise MappingError(
-                    f"Column {place} is {table.columns[place]!r} in {table.shown} and {first.columns[place]!r} in "
-                    f"{first.shown} (table {name!r}).",
-                    hint="Name the columns by their headers instead of their places.",
+                    f"Column {place} is {one!r} in {table.shown} and {other!r} in {first.shown} (table {name!r}).",
+                    hint="Repair the file, import it by another mapping, or name the columns by their headers.",
                 )
 
 
@@ -197,13 +188,16 @@ def used_columns(mapping: Mapping, name: str) -> UsedColumns:
 
 def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFile], dict[str, str]]:
     """Return the files of a table, and a sentence about the other matches by the obstacle to reading them."""
-    ending = PurePosixPath(source.files).suffix
-    ending = ending if ending[1:].isalnum() else ""
-    in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
+    ending = found[0] if (found := re.search(r"\.\w+$", source.files)) else ""
+    in_any_case = re.sub("[A-Za-z]", lambda letter: f"[{letter[0].lower()}{letter[0].upper()}]", ending)
     kinds: dict[str, list[str]] = {"": []}
     matches = root.glob(source.files.removesuffix(ending) + in_any_case)
     for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
-        kinds.setdefault(_obstacle(path, ending), []).append(path.relative_to(root).as_posix())
+        obstacle = (
+            BROKEN_LINKS if not path.exists() else FOLDERS if not path.is_file() else
+            OTHER_CASE if not path.name.endswith(ending) else APPLE_DOUBLE if path.name.startswith("._") else ""
+        )  # fmt: skip
+        kinds.setdefault(obstacle, []).append(path.relative_to(root).as_posix())
     if "**" in source.files:
         above, _, inside = source.files.partition("**")
         for path in root.glob(f"{above}**/*"):
@@ -225,7 +219,7 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
             f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes.values())}.",
             hint="Check --root: the pattern starts below it.",
         )
-    found = []
+    files = []
     for shown in kinds[""]:
         match = re.search(source.path, shown)
         if match is None:
@@ -234,35 +228,5 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
                 hint="Make the pattern narrower, or the expression wider.",
             )
         words = {word: value or "" for word, value in match.groupdict().items()}
-        found.append(FoundFile(root / shown, shown, {"file": PurePosixPath(shown).stem, **words}))
-    return found, notes
-
-
-def _obstacle(path: Path, ending: str) -> str:
-    """Return the obstacle to reading a match; empty for a plain file with the ending of the pattern."""
-    if not path.exists():
-        return BROKEN_LINKS
-    if not path.is_file():
-        return FOLDERS
-    if not path.name.endswith(ending):
-        return OTHER_CASE
-    if path.name.startswith("._"):
-        with path.open("rb") as opened:
-            return APPLE_DOUBLE if opened.read(4) == b"\0\x05\x16\x07" else ""
-    return ""
-
-
-def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
-    """Yield a recording for each combination of values in the columns of `split_by`, in order of appearance."""
-    if not mapping.split_by:
-        yield raw
-        return
-    lead = next(iter(raw.tables.values()))
-    rows_of: dict[tuple[str, ...], list[int]] = {}
-    for row, values in enumerate(zip(*(lead.texts(column) for column in mapping.split_by.values()), strict=True)):
-        rows_of.setdefault(values, []).append(row)
-    for values, rows in rows_of.items():
-        words = dict(zip(mapping.split_by, values, strict=True))
-        yield RawRecording(
-            {name: table.take(rows) for name, table in raw.tables.items()}, {**raw.words, **words}, raw.files
-        )
+        files.append(FoundFile(root / shown, shown, {"file": PurePosixPath(shown).stem, **words}))
+    return files, notes

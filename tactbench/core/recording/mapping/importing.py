@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import os
 import re
 import shutil
@@ -11,29 +10,30 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from dataclasses import replace as replaced
+from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import cast, get_args
 
 import numpy as np
+import yaml
+from pydantic import ValidationError
 
-from tactbench.core.errors import MappingError, RecordingError
+from tactbench.core.errors import MappingError, RecordingError, complaint
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
-from tactbench.core.recording.mapping.channels import MappedStream, device, fill, no_translation, sensor_of
+from tactbench.core.recording.mapping.channels import MappedStream, fill, no_translation, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
-from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
-from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
+from tactbench.core.recording.mapping.samples import compare_clocks, samples, times, translations
 from tactbench.core.recording.mapping.table import TextTable
-from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest
 from tactbench.core.recording.writer import write_recording
-from tactbench.core.samples import Block, StreamData
+from tactbench.core.samples import Block, Quality, StreamData
+from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
-from tactbench.core.spec.scene import Role
-from tactbench.core.spec.sensor import SensorSpec, StreamSpec
+from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
@@ -42,6 +42,7 @@ RIG = "import"
 ENDING = ".h5"
 WAITING, PLACING = ".importing-", ".placing-"
 """Prefixes of the folders in which the recordings of an import wait, and from which they are moved to their place."""
+_OTHERWISE = "Give another folder with --out DIR, or replace it with --replace."
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
@@ -112,60 +113,73 @@ def import_tables(
         If `out` cannot be written.
     """
     loaded = load_yaml(mapping, Mapping)
-    sensor, reference, streams = sensor_of(loaded)
-    require_answerable(loaded, streams, mapping)
-    tasks = tasks_text(loaded)
+    sensor, streams = sensor_of(loaded)
+    tasks = _tasks_text(loaded)
     sets, left_out, unused = find(loaded, mapping.parent if root is None else root)
     beside: list[Finding] = []
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
         text = f"its import left files out: {left_out[0]}{more}"
-        beside.append(Finding("left-out", "warning", text, count=len(left_out)))
+        beside.append(Finding("left-out", "warning", text))
     made: list[Imported] = []
-    origins: dict[str, str] = {}
     shapes: dict[str, Shape] = {}
+    origins: dict[str, str] = {}
     progress = progress or Progress()
-    one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
-    if one_each:
-        progress.begin(f"importing {mapping.stem}", len(sets))
+    progress.begin(f"importing {mapping.stem}", len(sets))
     with aside(out) as folder:
         for files in sets:
-            raws = read(loaded, files)
-            if not one_each:
-                progress.begin(f"importing {raws[0].files[0]}", len(raws))
-            for raw in raws:
+            for raw in read(loaded, files):
                 require_same_shape(loaded, raw, shapes)
-                meta = _meta(loaded, raw, sensor, reference)
-                _unique_name(meta, origins)
+                meta = _meta(loaded, raw, sensor, streams)
+                first = origins.setdefault(meta.name.casefold(), meta.origin)  # on some disks A.h5 and a.h5 are one
+                if len(origins) == len(made):
+                    raise MappingError(
+                        f"{first} and {meta.origin} would both become the recording {meta.name!r}.",
+                        hint="Put a word that differs between them into `recording.name`.",
+                    )
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
-                progress.advance(meta.name)
-        check_tasks(out, tasks, replace=replace)
-        write_tasks(folder, tasks)
+            progress.advance(next(iter(files.files.values())).shown)
+        target = out / FILE
+        if tasks and not replace and target.exists() and target.read_text(encoding="utf-8") != tasks:
+            raise MappingError(f"{target} exists already and declares other tasks.", hint=_OTHERWISE)
+        _write_tasks(folder, tasks)
         placed = _fitting(made, out, replace=replace)
         with writable(out):
             _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
-    shown = {file.shown for files in sets for file in files.files.values()}
+    shown = {file.shown for one in sets for file in one.files.values()}
     return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
 
 
 def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **about: object) -> list[Path]:
-    """Write recordings of tables in memory, as :func:`import_tables` does; their meta says what it is told `about`."""
-    sensor, reference, streams = sensor_of(mapping)
-    require_answerable(mapping, streams, out)
-    write_tasks(out, tasks_text(mapping))
-    metas = [(raw, _meta(mapping, raw, sensor, reference).model_copy(update=about)) for raw in raws]
+    """Write recordings of tables in memory, as :func:`import_tables` does; `about` are further fields of their meta."""
+    sensor, streams = sensor_of(mapping)
+    _write_tasks(out, _tasks_text(mapping))
+    metas = [(raw, _meta(mapping, raw, sensor, streams).model_copy(update=about)) for raw in raws]
     return [_write(out / f"{meta.name}{ENDING}", meta, mapping, raw, streams, ()).path for raw, meta in metas]
+
+
+def _tasks_text(mapping: Mapping) -> str:
+    """Return the text of the file of tasks beside the recordings; empty if the mapping declares none."""
+    if not mapping.tasks:
+        return ""
+    tasks = [task.model_dump(mode="json", exclude_unset=True) for task in mapping.tasks]
+    body = yaml.safe_dump({"version": 1, "tasks": tasks}, sort_keys=False, allow_unicode=True)
+    return f"# Tasks of these recordings, from their mapping; `tactbench run --recordings` reads them.\n{body}"
+
+
+def _write_tasks(folder: Path, text: str) -> None:
+    if text:
+        with writable(folder / FILE):
+            (folder / FILE).write_text(text, encoding="utf-8")
 
 
 @contextmanager
 def aside(out: Path) -> Iterator[Path]:
     """Return a context with the folder in which recordings wait until all are written; it is hidden from rigs.
 
-    Leftovers of an import that was killed are removed, or moved to their place where that had begun. Folders that were
-    made for an import that fails are removed again.
+    Leftovers of an import that was killed are removed, or moved to their place where that had begun.
     """
-    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
         for left in (*out.glob(f"{WAITING}*"), *out.glob(f"{PLACING}*")):
@@ -178,13 +192,8 @@ def aside(out: Path) -> Iterator[Path]:
     try:
         with _locked(folder):
             yield folder
-    except BaseException:
+    finally:
         _remove(folder)
-        for empty in made:
-            with suppress(OSError):
-                empty.rmdir()
-        raise
-    _remove(folder)
 
 
 @contextmanager
@@ -223,21 +232,22 @@ def _write(
         if (time := mapping.tables[name].time) is not None
     }
     found = [*compare_clocks(mapping, raw.tables, clocks)]
-    missing: dict[str, int] = {}
     written: dict[str, StreamData] = {}
     for name, stream in streams.items():
-        table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
-        taken = samples(stream, table)
-        found.extend(taken.findings)
-        missing.update(taken.missing)
-        notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
-        written[name] = StreamData(stream.spec, clock, taken.data, taken.quality, notes)
+        written[name], doubtful = samples(stream, raw.tables[stream.source.table], clocks.get(stream.source.table))
+        found += doubtful
     found += _given_away(meta, written)
     for name, table in raw.tables.items():
         if isinstance(table, TextTable) and table.trailing:
             text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            found.append(Finding("trailing-delimiter", "info", text, count=len(table)))
+            found.append(Finding("trailing-delimiter", "info", text))
     findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
+    missing = {
+        channel.name: int(lacking)
+        for one in written.values()
+        for channel, lacking in zip(one.spec.channels, np.sum(one.quality == Quality.MISSING, axis=0), strict=True)
+        if lacking
+    }
     counts = {f"rows of {name}": len(one.data) for name, one in written.items()}
     counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
     kept = [asdict(one) for one in findings if one.severity != "info"]
@@ -261,84 +271,58 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
     for (force, wanted), (name, column) in product(forces, sensed):
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
-            yield Finding("target-among-features", "warning", text, channels=(name,), count=1)
+            yield Finding("target-among-features", "warning", text, channels=(name,))
 
 
-def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:
-    origin = ", ".join(raw.files)
+def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict[str, MappedStream]) -> RecordingMeta:
+    origin, names = ", ".join(raw.files), mapping.recording
     words: dict[str, Scalar] = dict(raw.words)
     for name, word in mapping.words.items():
         words[name] = _derived(name, word, words, origin)
-    names = mapping.recording
-    name = fill(names.name, words, "recording.name")
-    if not _FILE_NAME.match(name):
+    given = {one: fill(getattr(names, one), words, f"recording.{one}") for one in ("name", "session", "trial", "role")}
+    if not _FILE_NAME.match(given["name"]):
         raise MappingError(
-            f"The recording made from {origin} would be called {name!r}, which is no file name.",
+            f"The recording made from {origin} would be called {given['name']!r}, which is no file name.",
             hint="Use letters, digits, dots, dashes and underscores; translate words under `words`.",
         )
-    role = fill(names.role, words, "recording.role") or None
-    if role is not None and role not in get_args(Role):
+    reasons = [one.reason for one in mapping.exclude if any(fnmatchcase(file, one.files) for file in raw.files)]
+    unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
+    remarks = [f"What time zero means in table {name} is not known." for name in unknown]
+    if mapping.clock == "none":
+        remarks = ["No clock: the source gives no time and no rate; rows are ordered, that is all."]
+    about = {one: fill(getattr(mapping.sensor, one), words, f"sensor.{one}") for one in ("name", "title")}
+    try:
+        return RecordingMeta.model_validate(given | {
+            "sensor": SensorSpec.model_validate(dict(sensor) | about),
+            "reference": [one.spec for one in streams.values() if one.source.of == "reference"],
+            "rig": RIG,
+            "simulated": False,
+            "clock": mapping.clock,
+            "role": given["role"] or None,
+            "labels": {
+                label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
+                for label, value in names.labels.items()
+            },
+            "excluded": "; ".join(dict.fromkeys(reasons)),
+            "remarks": (*mapping.remarks, *remarks),
+            "origin": origin,
+        })  # fmt: skip
+    except ValidationError as error:
         raise MappingError(
-            f"The role of {origin} would be {role!r}.", hint=f"Roles: {', '.join(get_args(Role))}, or empty."
-        )
-    return RecordingMeta(
-        name=name,
-        sensor=device(sensor, mapping, words, origin),
-        reference=reference,
-        rig=RIG,
-        simulated=False,
-        clock=mapping.clock,
-        session=fill(names.session, words, "recording.session"),
-        trial=fill(names.trial, words, "recording.trial"),
-        role=cast("Role | None", role),
-        labels={
-            label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
-            for label, value in names.labels.items()
-        },
-        excluded=_excluded(mapping, raw.files),
-        remarks=(*mapping.remarks, *_clock_remarks(mapping)),
-        origin=origin,
-    )
+            f"{origin} makes no recording: {complaint(error)}.", hint="Translate its words under `words`."
+        ) from error
 
 
 def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> str:
-    if word.of not in words:
-        raise MappingError(
-            f"The word {name!r} is made of {word.of!r}, which is not known; known are: {', '.join(sorted(words))}.",
-            hint="A word may be made of the words above it, of groups of `path`, and of columns of `split_by`.",
-        )
-    given = composed(str(words[word.of]))
+    given = composed(fill(f"{{{word.of}}}", words, f"word {name}"))
     if word.divided_by is not None:
         if not given.isdecimal():
             raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")
         return str(int(given) // word.divided_by)
-    known = {composed(str(key)): value for key, value in (word.values or {}).items()}
+    known = translations(word.values or {})
     if given not in known:
         raise no_translation(f"{origin}: {word.of}", given, name, known)
     return known[given]
-
-
-def _excluded(mapping: Mapping, files: Sequence[str]) -> str:
-    reasons = [rule.reason for rule in mapping.exclude if any(fnmatch.fnmatchcase(file, rule.files) for file in files)]
-    return "; ".join(dict.fromkeys(reasons))
-
-
-def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
-    if mapping.clock == "none":
-        return ("No clock: the source gives no time and no rate; rows are ordered, that is all.",)
-    unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
-    return tuple(f"What time zero means in table {name} is not known." for name in unknown)
-
-
-def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
-    # Folded: on some disks Press.h5 and press.h5 are one file.
-    folded = meta.name.casefold()
-    if folded in origins:
-        raise MappingError(
-            f"{origins[folded]} and {meta.origin} would both become the recording {meta.name!r}.",
-            hint="Put a word that differs between them into `recording.name`.",
-        )
-    origins[folded] = meta.origin
 
 
 def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
@@ -346,17 +330,10 @@ def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Impo
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:
-            if not _holds_the_same(target, one.path):
-                raise MappingError(
-                    f"{target} exists already and holds something else.",
-                    hint="Give another folder with --out DIR, or replace it with --replace.",
-                )
+            there = ""
+            with suppress(RecordingError):
+                there = content_digest(target)
+            if there != content_digest(one.path):
+                raise MappingError(f"{target} exists already and holds something else.", hint=_OTHERWISE)
             one.path.unlink()
     return [replaced(one, path=out / one.path.name) for one in made]
-
-
-def _holds_the_same(target: Path, path: Path) -> bool:
-    try:
-        return content_digest(target) == content_digest(path)
-    except RecordingError:
-        return False

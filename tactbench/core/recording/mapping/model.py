@@ -7,14 +7,14 @@ from pathlib import PurePosixPath
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import AliasChoices, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.recording import Scalar
-from tactbench.core.spec.sensor import ChannelKind, Vector
+from tactbench.core.spec.sensor import ChannelKind
 
 Column = int | str
 """A column is given by its place, counted from 0, or by its name in the header."""
@@ -26,23 +26,14 @@ MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
 
 
 class Tabular(Frozen):
-    """A table of rows and cells: keys that all such formats share."""
+    """A table of rows and cells; most keys are those of ``pandas.read_csv``."""
 
     header: bool
     """True: the first line names the columns. False: the file has no such line, and columns are numbered from 0."""
-    skiprows: Annotated[int, Field(ge=0)] | tuple[Annotated[int, Field(ge=0)], ...] = Field(
-        default=0, validation_alias=AliasChoices("skiprows", "skip_lines")
-    )
-    """Lines that are left out, as in pandas: how many at the beginning, or the list of their places, counted from 0."""
+    skiprows: Annotated[int, Field(ge=0)] | tuple[Annotated[int, Field(ge=0)], ...] = 0
+    """Lines that are left out: how many at the beginning, or the list of their places, counted from 0."""
     no_sample: tuple[str, ...] = ()
     """Texts that stand for "no sample" where a cell holds nothing else, for example "" or "NA"."""
-    transposed: bool = False
-    """True: each line holds all samples of one channel; with `header`, its first cell is the channel's name."""
-
-
-class Written(Tabular):
-    """A table in a text file; its keys are those of ``pandas.read_csv``."""
-
     decimal: str = Field(default=".", min_length=1, max_length=1)
     thousands: str | None = Field(default=None, min_length=1, max_length=1)
     """The mark between groups of three digits; None: there is none."""
@@ -50,33 +41,31 @@ class Written(Tabular):
     """The mark that begins a comment, which ends with its line; None: there are no comments."""
 
     @model_validator(mode="after")
-    def _marks_differ(self) -> Written:
+    def _marks_differ(self) -> Tabular:
         if self.thousands == self.decimal:
             raise ValueError(f"thousands and decimal are both {self.decimal!r}")
         return self
 
 
-class Csv(Written):
+class Csv(Tabular):
     """A text file whose cells are separated by a delimiter."""
 
     format: Literal["csv"] = "csv"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
 
 
-class Text(Written):
+class Text(Tabular):
     """A text file whose cells are separated by spaces or tabs."""
 
     format: Literal["text"] = "text"
 
 
-class Records(Frozen):
+class Records(Tabular):
     """A text file in which several lines of numbers make a row; its columns are numbered from 0 through these lines."""
 
     format: Literal["records"] = "records"
+    header: Literal[False] = False
     numbers_per_line: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=1)
-    first_line: str | None = None
-    """Text that the first line must be, which is then left out; None: the first line is data."""
-    no_sample: tuple[str, ...] = ()
 
 
 class Xlsx(Tabular):
@@ -235,9 +224,7 @@ class ChannelGroup(Frozen):
     sign: Literal[-1, 0, 1] = 0
     rest: float | None = None
     rest_source: Source | None = None
-    positions_m: tuple[Vector, ...] = ()
-    """One for each column; this key and those above are fields of a `ChannelSpec`, in the unit of the channel."""
-    position_source: Source | None = None
+    """Source of `rest`; this key and the four above are fields of a `ChannelSpec`, in the unit of the channel."""
 
     @field_validator("unit")
     @classmethod
@@ -261,10 +248,6 @@ class ChannelGroup(Frozen):
                 f"a channel of kind {self.kind} must state its sentinels, the numbers that mean 'no sample': "
                 "`sentinels: [-1]`, or `sentinels: []` if there are none"
             )
-        if (self.rest is None) != (self.rest_source is None):
-            raise ValueError("rest and rest_source belong together")
-        if bool(self.positions_m) != (self.position_source is not None):
-            raise ValueError("positions_m and position_source belong together")
         return self
 
 
@@ -381,24 +364,15 @@ class Mapping(Frozen):
         for name, stream in self.streams.items():
             if stream.table not in self.tables:
                 raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
-        if all(stream.of == "reference" for stream in self.streams.values()):
-            raise ValueError("all streams are of the reference; at least one must be of the sensor")
-        if len(self.tables) > 1 and self.join is None:
-            raise ValueError("several tables need `join`: by rows, or by clock")
-        timed = [name for name, table in self.tables.items() if table.time is not None]
-        if self.clock == "none" and timed:
-            raise ValueError(f"clock is none, but table {timed[0]} has a time column")
-        if self.clock != "none" and len(timed) < len(self.tables):
-            without = next(name for name in self.tables if name not in timed)
-            raise ValueError(f"clock is {self.clock}, but table {without} has no time; write `clock: none`")
-        join = self.join
-        if join is not None and join.by == "rows" and len(timed) > 1 and join.times_within_ms is None:
+            if (self.tables[stream.table].time is None) != (self.clock == "none"):
+                raise ValueError(f"clock is {self.clock}, but with `clock: none` alone {stream.table} has no time")
+        join, several = self.join, len(self.tables) > 1
+        if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
+            raise ValueError("several tables need `join`, by rows or by clock, and can be no arrays")
+        if join is not None and join.by == "rows" and join.times_within_ms is None and several and self.clock != "none":
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if join is not None and join.by == "clock" and (self.clock == "none" or self.split_by):
             raise ValueError("join by clock needs `clock: device` or `host`, and cannot be used with split_by")
-        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Arrays)]
-        if arrays and len(self.tables) > 1:
-            raise ValueError(f"table {arrays[0]} is an array, which cannot be joined with other tables")
         return self
 
 

@@ -5,21 +5,19 @@ from __future__ import annotations
 import json
 import math
 import re
-from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.health import listed
-from tactbench.core.recording.mapping.model import Column, Time
+from tactbench.core.recording.mapping.model import Column, Tabular, Time
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec import units
 
@@ -31,18 +29,35 @@ _MARKS = ",.'’ \u00a0\u202f"
 
 
 @dataclass(frozen=True)
-class Table(ABC):
-    """Rows and columns of one recording."""
+class Table:
+    """Rows and columns of one recording: typed columns of an array, a bag or a Parquet file; :class:`TextTable`."""
 
     shown: str
     """Name of the file for messages, with the array or the topic that the table is in it."""
     columns: tuple[Column, ...]
     """Names of all columns, or their places where they have no names; of a bag, the fields that are used."""
-    places: Sequence[int | str]
-    """Where each row stands in the file: its line, or its number from 0."""
+    places: Sequence[int]
+    """Place of each row in the file: its line, or its number from 0."""
+    values: Mapping[Column, Sequence[Any]]
+    """Values of each column that can be read, (n,): an array or a list."""
+    row: str = ", row "
+    """Text between the file and the place of a row in messages."""
 
     def __len__(self) -> int:
         return len(self.places)
+
+    def where(self, row: int | np.integer[Any]) -> str:
+        """Return the file of a row and its place in it, for messages."""
+        return f"{self.shown}{self.row}{self.places[int(row)]}"
+
+    def take(self, rows: Sequence[int]) -> Table:
+        """Return the table of some of the rows."""
+        values = {name: [column[row] for row in rows] for name, column in self.values.items()}
+        return replace(self, values=values, places=[self.places[row] for row in rows])
+
+    def texts(self, column: Column) -> list[str]:
+        """Return a column as texts, (n,)."""
+        return [plain(value) for value in self._plain(column)]
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a column, (n,), with NaN where there is no sample; raises MappingError for a cell without a number."""
@@ -67,183 +82,121 @@ class Table(ABC):
                 raise self._refusal(row, time.column, "time") from error
         return stamps
 
-    @abstractmethod
-    def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
+    def _column(self, column: Column) -> Sequence[Any]:
+        if column not in self.values:
+            raise no_column(self.shown, column, self.columns)
+        return self.values[column]
 
-    @abstractmethod
-    def take(self, rows: Sequence[int]) -> Self:
-        """Return the table of some of the rows."""
+    def _plain(self, column: Column) -> Iterable[Any]:
+        values = self._column(column)
+        return values.tolist() if isinstance(values, np.ndarray) else values
 
-    @abstractmethod
-    def where(self, row: int) -> str:
-        """Return the file of a row and its place in it, for messages."""
-
-    @abstractmethod
-    def _numbers(self, column: Column) -> FloatArray:
-        """Return a column, (n,), with infinity where there is neither a number nor a sign that it is missing."""
-
-    @abstractmethod
     def _stamps(self, column: Column) -> Iterable[Any]:
         """Return a column as dates, or as numbers in the spelling of Python."""
+        return self._plain(column)
+
+    def _numbers(self, column: Column) -> FloatArray:
+        """Return a column, (n,), with infinity where there is neither a number nor a sign that it is missing."""
+        return np.asarray(self._column(column), dtype=np.float64)
 
     def _refusal(self, row: int, column: Column, wanted: str) -> MappingError:
         """Return the error for a cell that holds no number, or no time."""
-        hint = "Leave the column out." if wanted == "number" else (
+        text = f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}."
+        return MappingError(text, hint=self._hint(row, column, wanted))
+
+    def _hint(self, _row: int, _column: Column, wanted: str) -> str:
+        if wanted == "number":
+            return "Leave the column out."
+        return (
             "Times are numbers, or dates like 2024-03-01T12:00:00.25+01:00. A row without a time cannot be kept; check "
             "column and unit, or write `clock: none`."
-        )  # fmt: skip
-        return MappingError(
-            f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}.", hint=hint
         )
 
 
 @dataclass(frozen=True)
 class TextTable(Table):
-    """Cells as they stand in a text file."""
+    """Cells as they stand in a text file or a sheet, in columns by place and by names that stand once in the header."""
 
-    cells: list[list[str]]
-    no_sample: Collection[str] = ()
+    row: str = ":"
+    how: Tabular = field(kw_only=True)
     trailing: bool = False
     """Whether every line of data ended with a delimiter that the header had not."""
-    decimal: str = "."
-    thousands: str | None = None
 
-    def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
-        place = self._place(column)
-        return [cells[place].strip() for cells in self.cells]
+    @cached_property
+    def _no_sample(self) -> frozenset[str]:
+        return frozenset(text.strip() for text in self.how.no_sample)
 
-    def take(self, rows: Sequence[int]) -> TextTable:
-        """Return the table of some of the rows."""
-        return replace(self, cells=[self.cells[row] for row in rows], places=[self.places[row] for row in rows])
-
-    def where(self, row: int) -> str:
-        """Return file and line of a row, for messages."""
-        return f"{self.shown}:{self.places[row]}"
-
-    def _numbers(self, column: Column) -> FloatArray:
-        place = self._place(column)
-        texts = [cells[place] for cells in self.cells]
-        number = {text: self._number(text.strip()) for text in {*texts}}  # readings repeat: most columns hold few texts
-        return np.array([number[text] for text in texts])
-
-    def _stamps(self, column: Column) -> Iterable[str]:
-        return (text if ":" in text else self._as_python(text) for text in self.texts(column))
-
-    def _as_python(self, cell: str) -> str:
-        """Return a number as Python writes it; an empty text if the cell is written in another way than the table."""
-        if self.decimal == "." and self.thousands is None:
-            return cell
-        whole, mark, rest = cell.partition(self.decimal)
-        if self.thousands is not None and self.thousands in whole:
-            first, *groups = whole.lstrip("+-").split(self.thousands)
-            if not 1 <= len(first) <= 3 or any(len(group) != 3 for group in groups):
-                return ""
-            whole = whole.replace(self.thousands, "")
-        if "." in whole + rest:  # beside a decimal comma: 1700000000.25 is a number, 1.234 may be a thousand and more
-            return "" if mark or _GROUPS.fullmatch(whole) else cell
-        return f"{whole}{mark and '.'}{rest}"
-
-    def _number(self, text: str) -> float:
-        """Return the number in a cell, NaN where the cell stands for no sample, infinity where it is no number."""
-        written = self._as_python(text)
-        try:
-            # Python's float() also reads 1_000, which no table means.
-            return math.nan if text in self.no_sample else math.inf if "_" in written else float(written)
-        except ValueError:
-            return math.inf
-
-    def _refusal(self, row: int, column: Column, wanted: str) -> MappingError:
-        """Return the error for a cell, with what its row or its spelling says of the cause."""
-        place = self._place(column)
-        cells, cell = self.cells[row], self.cells[row][place].strip()
-        given = f"{self.where(row)}: column {column!r}: {cell!r} is not a {wanted}"
-        if cell == self.columns[place]:
-            return MappingError(
-                f"{given}: the header stands here again, as where a logger was started again.",
-                hint="Cut the file there, or remove the line if the rows below it belong to the same recording.",
-            )
-        if mark := comment_mark(cells[0]):
-            return MappingError(f"{given}: this line is a comment.", hint=f"Write `comment: {mark!r}` under `read`.")
-        line = self.places[row]
-        if row == 0 and isinstance(line, int) and not any(math.isfinite(self._number(one.strip())) for one in cells):
-            return MappingError(
-                f"{given}; no cell of this row is, as in a row of units.",
-                hint=f"Write `skiprows: [{line - 1}]` under `read` (lines count from 0), with those left out already.",
-            )
-        marks = [mark for mark in _MARKS if mark in cell and mark != self.decimal]
-        if marks and not cell.strip("+-0123456789eE" + _MARKS):
-            mark = json.dumps(marks[0], ensure_ascii=False)
-            return MappingError(
-                f"{given}.",
-                hint=f"Under `read`, write `decimal: {mark}` if {mark} begins the decimals, `thousands: {mark}`"
-                " if it separates groups of three digits.",
-            )
-        if wanted == "time":
-            return super()._refusal(row, column, wanted)
-        words: Counter[str] = Counter()
-        for one in range(len(cells)):  # a column of which most is no number holds names
-            odd = [text for row_cells in self.cells if math.isinf(self._number(text := row_cells[one].strip()))]
-            words.update(odd if one == place or 2 * len(odd) < len(self) else ())
-        counted = [f"{word!r} ({count})" for word, count in words.most_common()]
-        likely = json.dumps([word for word, _ in words.most_common(12)], ensure_ascii=False)
-        return MappingError(
-            f"{given}. In columns of numbers stand {listed(counted, 'texts', 12)}.",
-            hint=f"If all mean 'no sample', write `no_sample: {likely}` under `read`.",
-        )
-
-    def _place(self, column: Column) -> int:
-        if isinstance(column, str) and self.columns.count(column) == 1:
-            return self.columns.index(column)
-        if not isinstance(column, int) or not 0 <= column < len(self.columns):
-            raise no_column(self.shown, column, self.columns)
-        name = self.columns[column]
+    def _column(self, column: Column) -> Sequence[str]:
+        name = self.columns[column] if isinstance(column, int) and column in self.values else None
         if isinstance(name, str) and math.isfinite(self._number(name)):
             raise MappingError(
                 f"{self.shown}: its header row has the number {name!r} in column {column}: that looks like a row of "
                 "data, which `header: true` would drop.",
                 hint="Write `header: false`; and `skiprows: 1` if that row is none of the data.",
             )
-        return column
-
-
-@dataclass(frozen=True)
-class ColumnTable(Table):
-    """Columns that are typed: those of an array, fields of the messages of a topic, columns of a Parquet file."""
-
-    values: Mapping[Column, Any]
-    """By column that can be read: an array or a list, (n,)"""
-    row: str = "row"
-    """What a row is called in messages."""
-
-    def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
-        return [plain(value) for value in self._stamps(column)]
-
-    def take(self, rows: Sequence[int]) -> ColumnTable:
-        """Return the table of some of the rows."""
-        values = {
-            name: column[rows] if isinstance(column, np.ndarray) else [column[row] for row in rows]
-            for name, column in self.values.items()
-        }
-        return replace(self, values=values, places=[self.places[row] for row in rows])
-
-    def where(self, row: int) -> str:
-        """Return file and number of a row, for messages."""
-        return f"{self.shown}, {self.row} {self.places[row]}"
+        return super()._column(column)
 
     def _numbers(self, column: Column) -> FloatArray:
-        return np.asarray(self._column(column), dtype=np.float64)
+        texts = self._column(column)
+        number = {text: self._number(text) for text in {*texts}}  # readings repeat: most columns hold few texts
+        return np.array([number[text] for text in texts])
 
-    def _stamps(self, column: Column) -> Iterable[Any]:
-        values: list[Any] = self._column(column)
-        return values.tolist() if isinstance(values, np.ndarray) else values
+    def _stamps(self, column: Column) -> Iterable[str]:
+        return (text if ":" in text else self._as_python(text) for text in self._column(column))
 
-    def _column(self, column: Column) -> Any:
-        if column not in self.values:
-            raise no_column(self.shown, column, self.columns)
-        return self.values[column]
+    def _as_python(self, cell: str) -> str:
+        """Return a number as Python writes it; an empty text if the cell is written in another way than the table."""
+        decimal, thousands = self.how.decimal, self.how.thousands
+        if decimal == "." and thousands is None:
+            return cell
+        whole, mark, rest = cell.partition(decimal)
+        if thousands is not None and thousands in whole:
+            first, *groups = whole.lstrip("+-").split(thousands)
+            if not 1 <= len(first) <= 3 or any(len(group) != 3 for group in groups):
+                return ""
+            whole = whole.replace(thousands, "")
+        if "." in whole + rest:  # beside a decimal comma: 1700000000.25 is a number, 1.234 may be a thousand and more
+            return "" if mark or _GROUPS.fullmatch(whole) else cell
+        return f"{whole}{mark and '.'}{rest}"
+
+    def _number(self, text: str) -> float:
+        """Return the number in a cell, NaN where the cell stands for no sample, infinity where it is no number."""
+        if text in self._no_sample:
+            return math.nan
+        written = self._as_python(text)
+        try:
+            return math.inf if "_" in written else float(written)  # float() also reads 1_000, which no table means
+        except ValueError:
+            return math.inf
+
+    def _hint(self, row: int, column: Column, wanted: str) -> str:
+        """Return the next step, by what the row or the spelling of the cell says of the cause."""
+        cell = self._column(column)[row]
+        columns = [self.values[place] for place in range(len(self.columns))]
+        if cell in self.columns:
+            return "The header stands here again: cut the file there, or remove the line if rows below it belong to it."
+        if mark := comment_mark(columns[0][row]):
+            return f"This line is a comment: write `comment: {mark!r}` under `read`."
+        if row == 0 and not any(math.isfinite(self._number(one[0])) for one in columns):
+            return (
+                f"No cell of this row is one, as in a row of units: write `skiprows: [{self.places[0] - 1}]` under "
+                "`read` (lines count from 0), with those left out already."
+            )
+        marks = [mark for mark in _MARKS if mark in cell and mark != self.how.decimal]
+        if marks and not cell.strip("+-0123456789eE" + _MARKS):
+            mark = json.dumps(marks[0], ensure_ascii=False)
+            return (
+                f"Under `read`, write `decimal: {mark}` if {mark} begins the decimals, `thousands: {mark}` if it "
+                "separates groups of three digits."
+            )
+        if wanted == "time":
+            return super()._hint(row, column, wanted)
+        words: dict[str, None] = {}
+        for one in columns:  # a column of which most is no number holds names
+            odd = [text for text in one if math.isinf(self._number(text))]
+            words |= dict.fromkeys(odd if one == self.values[column] or 2 * len(odd) < len(self) else ())
+        likely = json.dumps([*words][:12], ensure_ascii=False)
+        return f"If all mean 'no sample', write `no_sample: {likely}` under `read`."
 
 
 @dataclass(frozen=True)
@@ -259,14 +212,6 @@ class UsedColumns:
         """All columns that are used, each once."""
         return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time.column]))))
 
-    @cached_property
-    def paths(self) -> tuple[tuple[Column, tuple[str | int, ...]], ...]:
-        """The columns with the fields and places in which each lies: ``data.0`` in the field data at place 0."""
-        return tuple(
-            (column, tuple(int(part) if part.isdecimal() else part for part in str(column).split(".")))
-            for column in self.columns
-        )
-
     def as_float(self, column: Column) -> bool:
         """Return whether a column holds readings; a float64 would round times, which are kept as they are."""
         return column in self.numbers and (self.time is None or column != self.time.column)
@@ -275,18 +220,13 @@ class UsedColumns:
 def no_column(shown: str, column: Column, columns: Sequence[Column]) -> MappingError:
     """Return the error for a column that a table with `columns` does not have, or has several times."""
     names = [name for name in columns if isinstance(name, str)]
-    if isinstance(column, int):
-        message = f"{shown} has no column {column}: it has {len(columns)}, numbered from 0 to {len(columns) - 1}."
-        return MappingError(message, hint="Correct the place.")
-    if names.count(column) > 1:
-        return MappingError(f"{shown} has {names.count(column)} columns called {column!r}.", hint="Give its place.")
-    if not names:
-        return MappingError(
-            f"{shown} has no column {column!r}: its columns have no names.",
-            hint="Give its place, counted from 0; of text, `header: true` takes the names from the first line.",
-        )
-    hint = f"{did_you_mean(column, names)}It has: {listed(names, 'columns', 12)}."
-    return MappingError(f"{shown} has no column {column!r}.", hint=hint)
+    if isinstance(column, str) and (count := names.count(column)) > 1:
+        return MappingError(f"{shown} has {count} columns called {column!r}.", hint="Give its place.")
+    near = did_you_mean(str(column), names)
+    return MappingError(
+        f"{shown} has no column {column!r}.",
+        hint=f"{near}It has {len(columns)}, with places from 0: {listed([*map(str, columns)], 'columns', 12)}.",
+    )
 
 
 def plain(value: Any) -> str:
@@ -295,7 +235,7 @@ def plain(value: Any) -> str:
 
 
 def comment_mark(cell: str) -> str | None:
-    """Return what a comment seems to begin with, if a line that begins with `cell` looks like one."""
+    """Return the mark that a comment seems to begin with, if a line that begins with `cell` looks like one."""
     return next((mark for mark in "#%" if cell.lstrip().startswith(mark)), None)
 
 

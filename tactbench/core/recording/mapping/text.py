@@ -6,16 +6,14 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping.model import Csv, Records, Tabular, Text, Written
+from tactbench.core.recording.mapping.model import Column, Csv, Records, Tabular, Text
 from tactbench.core.recording.mapping.table import TextTable, comment_mark
 
-_DELIMITERS = {"\t": "tab", ";": "semicolon"}
-Line = tuple[int | str, list[str]]
-"""The cells of a row, and its line in the file; where lines are channels, the place of its cells in them."""
+Line = tuple[int, list[str]]
+"""The cells of a row, and its line in the file."""
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
@@ -40,35 +38,49 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
             f"{shown}:{text.count(chr(10), 0, text.index(chr(0))) + 1} has NUL bytes, as a power cut leaves them.",
             hint="Remove the lines that have some; if all have, the file is UTF-16: `iconv -f UTF-16 -t UTF-8`.",
         )
-    if isinstance(how, Records):
-        return _records(_lines(text), shown, how)
-    return table_of(shown, list(_cells(text, shown, how)), how)
+    # Not splitlines(): that also breaks at form feeds and Unicode separators, and line numbers would be wrong. Lines
+    # that are left out stay as blank ones, so that the others keep their numbers.
+    lines = [
+        "\n" if skipped(place, how) else line for place, line in enumerate(io.StringIO(text, newline="").readlines())
+    ]
+    if how.comment is not None:
+        kept = (line.partition(how.comment)[0] for line in lines)
+        lines = [line if line.strip() else "\n" for line in kept]
+    if isinstance(how, Csv):
+        return table_of(shown, list(_delimited(lines, shown, how)), how)
+    cells = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
+    return table_of(shown, _joined(cells, shown, how) if isinstance(how, Records) else cells, how)
 
 
 def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     """Return the table of some lines, of which the first is the header if `how` says so."""
-    header, trailing = None, _trailing(lines, how)
-    if trailing:
-        for _, cells in lines[how.header and not how.transposed :]:
-            cells.pop()
-    if how.transposed and lines:
-        _same_length(shown, lines, len(lines[0][1]))
-        turned = zip(*(cells for _, cells in lines), strict=True)
-        lines = [(f"cell {number}", list(cells)) for number, cells in enumerate(turned, 1)]
-    if how.header and lines:
-        header = tuple(cell.strip() for cell in lines.pop(0)[1])
+    header = tuple(cell.strip() for cell in lines.pop(0)[1]) if how.header and lines else ()
     if not lines:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skiprows`.")
-    if header and (mark := comment_mark(header[0])) and len(header) < len(lines[0][1]):
+    wide = len(header or lines[0][1])
+    mark = comment_mark(header[0]) if header else None
+    if mark and wide < len(lines[0][1]):
         raise MappingError(
             f"{shown}: a comment, {header[0]!r}, stands where the header is expected.",
             hint=f"Write `comment: {mark!r}` under `read`.",
         )
-    _same_length(shown, lines, len(header) if header else len(lines[0][1]))
-    rows, places = [cells for _, cells in lines], [place for place, _ in lines]
-    no_sample = frozenset(text.strip() for text in how.no_sample)
-    table = TextTable(shown, header or tuple(range(len(rows[0]))), places, rows, no_sample, trailing)
-    return replace(table, decimal=how.decimal, thousands=how.thousands) if isinstance(how, Written) else table
+    trailing = bool(header) and all(len(cells) == wide + 1 and not cells[-1].strip() for _, cells in lines)
+    for number, cells in lines:
+        if len(cells) != wide + trailing:
+            mark = comment_mark(cells[0])
+            raise MappingError(
+                f"{shown}:{number}: {len(cells)} cells, where {wide} are expected.",
+                hint=f"If this line is a comment, write `comment: {mark!r}` under `read`." if mark else
+                "Repair the row, or correct the delimiter; a file cut short ends like this.",
+            )  # fmt: skip
+    turned = zip(*(cells for _, cells in lines), strict=True)
+    columns = [[cell.strip() for cell in column] for column in turned][:wide]
+    names: dict[Column, list[str]] = {
+        name: column for name, column in zip(header, columns, strict=False) if header.count(name) == 1
+    }
+    places = [number for number, _ in lines]
+    values = names | dict(enumerate(columns))
+    return TextTable(shown, header or tuple(range(wide)), places, values, trailing=trailing, how=how)
 
 
 def skipped(place: int, how: Tabular) -> bool:
@@ -76,88 +88,45 @@ def skipped(place: int, how: Tabular) -> bool:
     return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
 
 
-def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
-    """Return whether every line of data ends with a delimiter, and so with an empty cell that has no name."""
-    data = lines[how.header and not how.transposed :]
-    longer = how.transposed or (how.header and bool(data) and len(data[0][1]) == len(lines[0][1]) + 1)
-    return longer and bool(data) and all(not cells[-1].strip() for _, cells in data)
-
-
-def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
+def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
     """Yield the lines that are not blank, cut into cells."""
-    # Lines that are left out stay as blank ones, so that the others keep their numbers.
-    lines = ["\n" if skipped(place, how) else line for place, line in enumerate(_lines(text))]
-    if how.comment is not None:
-        kept = (line.partition(how.comment)[0] for line in lines)
-        lines = [line if line.strip() else "\n" for line in kept]
-    if isinstance(how, Text):
-        for number, line in enumerate(lines, 1):
-            if line.strip():
-                yield number, line.split()
-        return
     first = next((line for line in lines if line.strip()), "")
     if first.lower().startswith("sep="):
         hint = f"Write `skiprows: {lines.index(first) + 1}` under `read`, and `delimiter: {first[4:5]!r}`."
         raise MappingError(f"{shown} begins with {first.strip()!r}, a line for Excel.", hint=hint)
-    for mark, name in _DELIMITERS.items():
+    for mark in "\t;":
         if mark in first and how.delimiter not in first:
             raise MappingError(
-                f"{shown} is separated by {name}s, and not by {how.delimiter!r}.",
-                hint=f"Write delimiter: {json.dumps(mark)} under `read`.",
+                f"{shown} is separated by {json.dumps(mark)}, and not by {how.delimiter!r}.",
+                hint=f"Write `delimiter: {json.dumps(mark)}` under `read`.",
             )
     reader = csv.reader(lines, delimiter=how.delimiter, strict=True)
     try:
-        for cells in reader:
-            if cells:
-                yield reader.line_num, cells
+        yield from ((reader.line_num, cells) for cells in reader if cells)
     except csv.Error as error:
         raise MappingError(
             f"{shown}:{reader.line_num}: {error}.", hint="Check the quotes and the delimiter."
         ) from error
 
 
-def _lines(text: str) -> list[str]:
-    # Not splitlines(): that also breaks at form feeds and Unicode separators, and line numbers would be wrong.
-    return io.StringIO(text, newline="").readlines()
-
-
-def _same_length(shown: str, lines: Sequence[Line], wide: int) -> None:
-    for number, cells in lines:
-        if len(cells) != wide:
-            mark = cells and comment_mark(cells[0])
-            raise MappingError(
-                f"{shown}:{number}: {len(cells)} cells, where {wide} are expected.",
-                hint=f"If this line is a comment, write `comment: {mark!r}` under `read`." if mark else
-                "Repair the row, or correct the delimiter; a file cut short ends like this.",
-            )  # fmt: skip
-
-
-def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:
-    first = lines[0].strip() if lines else "nothing"
-    if how.first_line not in (None, first):
-        raise MappingError(
-            f"{shown}:1: {first!r}, where the line {how.first_line!r} is expected.",
-            hint="Correct `first_line`, or the pattern of the files.",
-        )
-    skip = how.first_line is not None
-    there = [(number, line.split()) for number, line in enumerate(lines, 1) if number > skip and line.strip()]
-    if not there:
-        raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
+def _joined(lines: Sequence[Line], shown: str, how: Records) -> list[Line]:
+    """Return a row for the lines of each record; raises MappingError for a line of another length."""
     per_row = len(how.numbers_per_line)
-    for place, (number, cells) in enumerate(there):
-        wide = how.numbers_per_line[place % per_row]
+    rows: list[Line] = []
+    for place, (number, cells) in enumerate(lines):
+        line, wide = place % per_row, how.numbers_per_line[place % per_row]
         if len(cells) != wide:
             raise MappingError(
-                f"{shown}:{number}: {len(cells)} numbers on line {place % per_row + 1} of a record, where {wide} are "
-                "expected.",
+                f"{shown}:{number}: {len(cells)} numbers on line {line + 1} of a record, where {wide} are expected.",
                 hint="Repair the record, or correct `numbers_per_line`.",
             )
-    if len(there) % per_row:
+        if line:
+            rows[-1][1].extend(cells)
+        else:
+            rows.append((number, cells))
+    if len(lines) % per_row:
         raise MappingError(
-            f"{shown}:{there[-1][0]}: the file ends after line {len(there) % per_row} of a record of {per_row} lines.",
+            f"{shown}: the file ends after line {len(lines) % per_row} of a record of {per_row} lines.",
             hint="The file was cut short: get it again.",
         )
-    begins = range(0, len(there), per_row)
-    rows = [[cell for _, cells in there[begin : begin + per_row] for cell in cells] for begin in begins]
-    places = [there[begin][0] for begin in begins]
-    return TextTable(shown, tuple(range(len(rows[0]))), places, rows, how.no_sample)
+    return rows

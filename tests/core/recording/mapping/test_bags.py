@@ -125,18 +125,18 @@ def test_a_damaged_bag_is_refused_and_nothing_is_left(tmp_path):
     middle = len(whole) // 2
     for damaged in (whole[:middle], whole[:-1], whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]):
         path.write_bytes(damaged)
-        with pytest.raises(MappingError, match=r"press\.mcap is no whole bag") as found:
+        with pytest.raises(MappingError, match=r"press\.mcap") as found:
             imported(tmp_path)
         assert "mcap recover" in found.value.hint
-        assert not (tmp_path / "out").exists()
+        assert not list((tmp_path / "out").iterdir())
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"tables__force__read__topic": "/forces"}, r"no message of topic '/forces'"),
-        ({"streams__taxels__channels__0__columns": "data.3"}, r"/taxels, message 0 has no 'data\.3'"),
-        ({"tables__taxels__time__unit": "ms"}, "is in nanoseconds"),
+        ({"tables__force__read__topic": "/forces"}, "'/forces'"),
+        ({"streams__taxels__channels__0__columns": "data.3"}, r"'data\.3'"),
+        ({"tables__taxels__time__unit": "ms"}, "unit: ns"),
     ],
 )
 def test_what_a_bag_does_not_have_is_named(tmp_path, changes, says):
@@ -149,5 +149,5 @@ def test_another_encoding_is_named(tmp_path):
     with plain_bag(tmp_path) as writer:
         channel = writer.register_channel("/taxels", "protobuf", writer.register_schema("pad.Taxels", "protobuf", b""))
         writer.add_message(channel, START, b"\x08\x01", START)
-    with pytest.raises(MappingError, match="'/taxels' is encoded as protobuf"):
+    with pytest.raises(MappingError, match="protobuf"):
         imported(tmp_path)

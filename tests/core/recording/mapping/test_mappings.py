@@ -1,6 +1,5 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
-import re
 import unicodedata
 
 import numpy as np
@@ -8,7 +7,7 @@ import openpyxl
 import pytest
 import scipy.io
 
-from tactbench.core.errors import MappingError
+from tactbench.core.errors import ConfigError, MappingError
 from tactbench.core.recording.health import marking
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
@@ -64,21 +63,24 @@ def test_columns_by_name_ranges_and_combinations(tables):
     assert taxels.t_ns is None
 
 
-@pytest.mark.parametrize(("transposed", "end"), [(False, ","), (True, ""), (True, ",")])
-def test_a_line_a_channel_and_a_delimiter_too_many(tables, transposed, end):
-    table = np.array([["t", "a", "b", "c", "f"], *(line.split(",") for line in rows().split())])
-    first, *others = [",".join(line) for line in (table.T if transposed else table)]
-    tables.put("press.csv", "\n".join([first + end * transposed, *(line + end for line in others)]))
-    report = tables.run(
-        tables__table__read={"format": "csv", "header": True, "transposed": transposed},
-        tables__table__time__column="t", streams__taxels__channels__0__columns=["a", "b", "c"],
-        streams__force__channels__0__columns="f",
-    )  # fmt: skip
-    _, streams = read(report)
-    assert np.array_equal(streams["taxels"].data[:, 1], np.arange(40) * 2)
-    assert np.array_equal(streams["taxels"].t_ns, np.arange(40) * 10_000_000)
+@pytest.mark.parametrize("end", ["", ","])
+def test_a_delimiter_that_ends_every_line_but_the_header_makes_no_column(tables, end):
+    tables.put("press.csv", "t,a,b,c,f\n" + rows().replace("\n", f"{end}\n"))
+    report = tables.run(tables__table__read__header=True)
+    assert np.array_equal(read(report)[1]["taxels"].data[:, 1], np.arange(40) * 2)
     (made,) = report.recordings
     assert [one.check for one in made.findings].count("trailing-delimiter") == len(end)
+
+
+def test_records_of_several_lines_below_a_line_that_is_left_out(tables):
+    read_as = {"format": "records", "skiprows": 1, "numbers_per_line": [2, 3]}
+    text = "".join(f"{row} {row * 2}\n{row * 3} {row % 5} {row}\n" for row in range(20))
+    for wrong, place in ((text, "press.csv:2"), (f"-1\n{text}7 7\n", "2 lines"), (f"-1\n{text}7\n", "press.csv:42")):
+        tables.put("press.csv", wrong)
+        tables.refused("press.csv", place, tables__table__read=read_as)
+    tables.put("press.csv", f"-1\n{text}")
+    taxels = read(tables.run(tables__table__read=read_as))[1]["taxels"]
+    assert np.array_equal(taxels.data, np.arange(20)[:, None] * [2, 3, 1] % [99, 99, 5])
 
 
 @pytest.mark.parametrize("name", ["npz", "mat"])
@@ -135,7 +137,7 @@ def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
     np.save(tables.data / "x_a.npy", np.zeros((4, 2, 3, 5)))
     tables.refused("labels_a.npy", text=NPY)
     np.save(tables.data / "labels_a.npy", np.array([0, 1, 2, "a"], dtype=object))
-    tables.refused("x_a.npy cannot be read", "allow_pickle", text=NPY)
+    tables.refused("x_a.npy", "allow_pickle", text=NPY)
 
 
 def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
@@ -146,7 +148,7 @@ def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
     book.save(tables.data / "press.xlsx")
     report = tables.run(
         tables__table__files="*.xlsx", streams__taxels__channels__0__columns=["a", "b", "c"],
-        tables__table__read={"format": "xlsx", "header": True, "skip_lines": 2, "no_sample": ["", "NA"]},
+        tables__table__read={"format": "xlsx", "header": True, "skiprows": 2, "no_sample": ["", "NA"]},
     )  # fmt: skip
     taxels = read(report)[1]["taxels"].data
     assert np.array_equal(taxels[:, 0], np.arange(20))
@@ -195,7 +197,7 @@ def test_two_tables_row_by_row_each_with_its_clock(tables):
     [
         ({"1_probe/states.csv": states(39)}, "39 rows"),
         ({"1_probe/states.csv": states(late_ms=5.5)}, "5.5 ms"),
-        ({"2_probe/states.csv": states()}, "needs one file of table 'states'"),
+        ({"2_probe/states.csv": states()}, "{'start': '1'}"),
     ],
 )
 def test_tables_that_do_not_belong_together(tables, files, says):
@@ -230,13 +232,14 @@ def test_clocks_that_meet_in_part_or_not_at_all(tables):
     assert not found()
     tables.put("scale.csv", seconds(50, 110))
     (part,) = found()
-    assert "9 of 59 s in common: they begin 50 s and end 50 s apart" in part.message
+    assert (part.check, part.severity) == ("spans", "warning")
+    assert "9 of 59" in part.message
     assert not found(tables__scale__time__offset_s=-50)
     assert "epoch" in found(tables__scale__time__epoch="unknown")[0].message
     tables.put("scale.csv", seconds(3600, 3660))
     for path in tables.out.iterdir():
         path.unlink()
-    spans = ["2023-11-14T22:13:20.000Z to 2023-11-14T22:14:19.000Z", "2023-11-14T23:13:20.000Z", "3541 s"]
+    spans = ["2023-11-14T22:13:20.0", "2023-11-14T22:14:19.0", "2023-11-14T23:13:20.0", "3541"]
     tables.refused("pad.csv", "scale.csv", *spans, text=BY_CLOCK)
 
 
@@ -250,7 +253,7 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     assert [text.split()[0] for text in report.left_out] == ["2_probe/sensor.csv", "3_probe/states.csv"]
     with open_recording(report.recordings[0].path) as recording:
         (mark,) = marking(recording)
-    assert re.fullmatch(r"its import left files out: 2_probe/sensor.csv .* And 1 more\.", mark.message)
+    assert (mark.check, "2_probe/sensor.csv" in mark.message) == ("left-out", True)
 
 
 def test_one_file_of_several_sessions(tables):
@@ -276,7 +279,7 @@ def test_roles_labels_and_excluded_files(tables):
 
 def test_sentinels_must_be_stated(tables):
     tables.put("press.csv", rows())
-    tables.refused("must state its sentinels", streams__force__channels__0__sentinels=None)
+    tables.refused("`sentinels: []`", streams__force__channels__0__sentinels=None)
 
 
 ROWS = np.arange(600)
@@ -301,7 +304,7 @@ def unsigned(values):
         (np.where(ROWS % 2, -1, PRESSES), "`sentinels: [-1]`"),
         (np.where(ROWS % 100 < 10, -1, PRESSES + 5), "`sentinels: [-1]`"),
         (np.where(ROWS % 500 == 250, -9999, PRESSES), "`sentinels: [-9999]`"),
-        (unsigned(400 * PRESSES - 40 + ROWS % 90), "fz: jumps between 0 and 65536"),
+        (unsigned(400 * PRESSES - 40 + ROWS % 90), "65536"),
         (PRESSES, ""),
         (np.minimum(PRESSES, 6), ""),
         (np.full(600, 7), ""),
@@ -326,27 +329,68 @@ def test_values_that_are_no_readings_are_reported_and_kept(tables, column, says)
 @pytest.mark.parametrize(
     ("text", "change", "says"),
     [
-        ("0,1,2,3,4\n1,1,2,3\n", {}, "press.csv:2: 4 cells"),
-        ("0,1,2,3,4\nsoon,1,2,3,4\n", {}, "press.csv:2: column 0: 'soon'"),
-        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True, "tables__table__files": "press.csv"},
-         "press.csv:cell 3: column 0: 'soon'"),
-        ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "column 1 (channel t1)"),
-        ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
-        (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
+        ("0,1,2,3,4\n1,1,2,3\n", {}, "press.csv:2: 4"),
+        ("0,1,2,3,4\nsoon,1,2,3,4\n", {}, "'soon'"),
+        ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "(channel t1)"),
+        ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, '`delimiter: "\\t"`'),
+        (rows(), {"tables__table__read__header": True}, "`skiprows: 1`"),
         (rows(), {"streams__force__channels__0__given_in": "mm"}, "'mm'"),
         (rows(), {"tables__table__files": "*.tsv"}, "'*.tsv'"),
-        (rows(), {"tables__table__path": "(?P<start>[0-9]+)_"}, "other.csv matches"),
+        (rows(), {"tables__table__path": "(?P<start>[0-9]+)_"}, "other.csv"),
         (rows(), {"recording__name": "{start}"}, "'start'"),
-        (rows(), {"recording__name": "same"}, "other.csv and press.csv"),
+        (rows(), {"recording__name": "same"}, "'same'"),
         (rows(), {"streams__taxels__dtype": "uint8", "streams__taxels__channels__0__columns": "0..2"},
-         "0.01 is no uint8"),
-        (rows(), {"tables__table__time__epoch": "unix"}, "the year 1970"),
+         "0.01"),
+        (rows(), {"tables__table__time__epoch": "unix"}, "1970"),
+        (rows(39), {"streams__taxels__annotations": {"press": {"rows_per": 20}}}, "39"),
+        (rows(), {"streams__taxels__annotations": {"press": {"column": 3, "values": {"0": "a"}}}}, "'3'"),
+        (rows(), {"streams__taxels__channels__0__name": "t{n}", "streams__taxels__channels__0__over": {"n": "1..2"}},
+         "taxels"),
+        (rows(), {"streams__taxels__channels__0__columns": "3..1"}, "'3..1'"),
+        (rows(), {"words": {"s": {"of": "file", "values": {"other": "A"}}}, "sensor__name": "pad-{s}"}, "'pad-A'"),
+        (rows(), {"words": {"s": {"of": "file", "values": {"press": "a"}}}}, "'other'"),
+        (rows(), {"words": {"s": {"of": "file", "divided_by": 2}}}, "'other'"),
+        (rows(), {"words": {"s": {"of": "files", "divided_by": 2}}}, "'files'"),
+        (rows(), {"recording__role": "{file}"}, "'other'"),
+        (rows(), {"recording__name": "a/{file}"}, "'a/other'"),
+        (rows(), {"streams__taxels__of": "reference"}, "streams"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_with_its_place(tables, text, change, says):
     tables.put("other.csv", rows())
     tables.put("press.csv", text)
     tables.refused(says, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"clock": "none"}, "clock"),
+        ({"tables__table__time": None}, "clock"),
+        ({"streams__taxels__table": "tables"}, "'tables'"),
+        ({"join": {"by": "clock"}, "split_by": {"a": 1}}, "split_by"),
+        ({"words": {"s": {"of": "file"}}}, "divided_by"),
+        ({"words": {"s": {"of": "file", "values": {"a": "b"}, "divided_by": 2}}}, "divided_by"),
+        ({"streams__taxels__annotations": {"a": {}}}, "rows_per"),
+        ({"streams__taxels__annotations": {"a": {"column": 1, "rows_per": 2}}}, "rows_per"),
+        ({"streams__taxels__rate_hz": 100}, "rate_source"),
+        ({"tables__table__read": {"format": "csv", "header": False, "decimal": ",", "thousands": ","}}, "thousands"),
+        ({"tables__table__read": {"format": "npz", "axes": ["row"]}}, "array"),
+        ({"tables__table__read": {"format": "npy", "axes": ["row"], "array": "x"}}, "array"),
+        ({"tables__table__read": {"format": "npy", "axes": ["row", "row"]}}, "axes"),
+        ({"tables__table__read": {"format": "npy", "axes": ["recording", "recording"]}}, "axes"),
+        ({"tables__table__read": {"format": "npy", "axes": ["row"], "per_recording": {"y": "y"}}}, "per_recording"),
+        ({"tables__table__time__unit": "mm"}, "unit"),
+        ({"tables__table__path": "(?P<Start>.)"}, "'Start'"),
+        ({"tables__table__path": "("}, "path"),
+        ({"streams__force__channels__0__unit": "count"}, "unit"),
+    ],
+)
+def test_a_mapping_that_contradicts_itself_is_refused_with_its_line(tables, change, key):
+    tables.put("press.csv", rows())
+    with pytest.raises(ConfigError, match=r"mapping\.yaml:\d+") as caught:
+        tables.run(**change)
+    assert key in str(caught.value)
 
 
 def test_the_same_import_changes_nothing_and_another_one_is_refused_or_replaces_if_asked_to(tables):
@@ -373,7 +417,7 @@ def test_a_force_among_the_sensors_columns_is_warned_of(tables, columns):
 def test_times_in_a_wrong_unit_are_warned_of_and_that_is_kept_with_the_recording(tables):
     tables.put("press.csv", "".join(f"{10 * row},{row},2,3,{row}\n" for row in range(40)))
     (made,) = tables.run().recordings
-    assert any(one.check == "rate" and one.message.endswith("ms read as s?") for one in made.findings)
+    assert any(one.check == "rate" and "ms" in one.message for one in made.findings)
     read(tables.run())  # its content is what was written
     with open_recording(made.path) as recording:
         kept = recording.meta.provenance["findings"]

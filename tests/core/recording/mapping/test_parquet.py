@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tactbench.core.errors import MappingError
+
 from .made import read
 
 pa = pytest.importorskip("pyarrow", reason="the extra parquet is not installed")
@@ -48,7 +50,7 @@ def test_episodes_of_one_file(tables):
     episodes(tables)
     report = tables.run(EPISODES)
     assert [made.meta.name for made in report.recordings] == ["episode-0", "episode-1", "episode-2"]
-    assert (report.missing, report.unused) == ({"fz": 1}, ("1 of 9 columns of table frames: frame_index",))
+    assert (report.missing, report.unused[0].endswith(": frame_index")) == ({"fz": 1}, True)
     _, streams = read(report, 1)
     assert np.array_equal(streams["taxels"].data, np.arange(16, 32, dtype=np.float32).reshape(4, 4))
     assert streams["taxels"].annotations["task"].tolist() == ["press"] * 4
@@ -63,17 +65,17 @@ def test_stamps_are_dates(tables):
     assert read(tables.run(EPISODES, **unix))[1]["taxels"].t_ns[0] == 1719828000 * 10**9 + 1
     episodes(tables, timestamp=pa.array(stamps))
     tables.out = tables.data / "out"
-    with pytest.raises(Exception, match="without a time zone"):
+    with pytest.raises(MappingError, match="zone: UTC"):
         tables.run(EPISODES, **unix)
 
 
 @pytest.mark.parametrize(
     ("state", "change", "says"),
     [
-        ([[1, 2, 3, 4]] * 11 + [[1, 2, 3]], {}, "'observation.state' have 4 values, and 3"),
-        ([[1, 2, 3]] * 12, {}, "no column 'observation.state.3'"),
-        (None, {"streams__force__channels__0__columns": "forces"}, "no column 'forces'"),
-        (None, {"streams__force__channels__0__columns": "task"}, "'task' holds no numbers"),
+        ([[1, 2, 3, 4]] * 11 + [[1, 2, 3]], {}, "'observation.state'"),
+        ([[1, 2, 3]] * 12, {}, "'observation.state.3'"),
+        (None, {"streams__force__channels__0__columns": "forces"}, "'forces'"),
+        (None, {"streams__force__channels__0__columns": "task"}, "'task'"),
     ],
 )
 def test_what_a_file_does_not_have_is_named(tables, state, change, says):

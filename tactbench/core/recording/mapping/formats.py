@@ -1,0 +1,249 @@
+"""Recognition of a file's format, and the readers of NumPy arrays, MATLAB files, Excel workbooks and Parquet files."""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+import zipfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from datetime import date, time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import MappingError, did_you_mean
+from tactbench.core.recording.mapping.channels import fill
+from tactbench.core.recording.mapping.model import Arrays, Column, Xlsx
+from tactbench.core.recording.mapping.table import Table, TextTable, UsedColumns, no_column, plain
+from tactbench.core.recording.mapping.text import skipped, table_of
+
+Words = dict[str, str]
+
+_UTF_16 = "is text in UTF-16", "", "Convert it: `iconv -f UTF-16 -t UTF-8 FILE > NEW`."
+_WEB_PAGE = "is a web page", "", "Download the file itself: a link to the raw file, or after signing in."
+_SIGNATURES: dict[bytes, tuple[str, str, str]] = {
+    b"\x1f\x8b": ("is compressed with gzip", "", "Unpack it: `gunzip FILE`."),
+    b"PK\x03\x04": ("is a zip archive", "", "Unpack it: `unzip FILE`."),
+    b"\xd0\xcf\x11\xe0": ("is a workbook of Excel before 2007 (.xls)", "", "Save the sheet as .xlsx or CSV."),
+    b"\xff\xfe": _UTF_16,
+    b"\xfe\xff": _UTF_16,
+    b"version https://git-lfs": ("is a Git LFS pointer; the table is not here", "", "Fetch it: `git lfs pull`."),
+    b"/annex/objects/": ("is a git-annex pointer; the table is not here", "", "Fetch it: `datalad get FILE`."),
+    b"<!doctype html": _WEB_PAGE,
+    b"<html": _WEB_PAGE,
+    b"#ROSBAG V": ("is a bag of ROS 1", "", "Make a bag of ROS 2 in MCAP of it: `rosbags-convert`."),
+    b"SQLite format 3\0": ("is an SQLite database, as bags of ROS 2 are", "",
+                           "Convert a bag: `mcap convert FILE NEW.mcap`; of another database, save a table as CSV."),
+    b"\x89HDF\r\n\x1a\n": ("is an HDF5 file", "", "A recording of tactbench needs no import; save another as CSV."),
+    b"MATLAB 7.3": ("is a MATLAB file of version 7.3", "", "Save it with -v7, or the table as CSV."),
+    b"MATLAB 5.0": ("is a MATLAB file", "mat", ""),
+    b"PAR1\x15": ("is a Parquet file", "parquet", ""),
+    b"\x93NUMPY": ("is a NumPy array", "npy", ""),
+    b"\x89MCAP0": ("is an MCAP bag", "mcap", ""),
+}  # fmt: skip
+"""By its first bytes what a file is, the format that reads it, and the next step if none does."""
+
+
+def require_format(path: Path, shown: str, wanted: str) -> None:
+    """Raise MappingError if a file cannot be read, or is by its first bytes of another format than `wanted`."""
+    try:
+        with path.open("rb") as opened:
+            first = opened.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()
+    except OSError as error:
+        raise MappingError(f"{shown} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
+    for begins, (what, read_by, step) in _SIGNATURES.items():
+        # The letters of a web page may have either case; those of other files may not: a table may begin with "par1".
+        if not (first.lower() if begins.startswith(b"<") else first).startswith(begins):
+            continue
+        if begins.startswith(b"PK"):
+            names: list[str] = []
+            with suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(path) as archive:
+                names = archive.namelist()
+            if "xl/workbook.xml" in names:
+                what, read_by = "is an Excel workbook", "xlsx"
+            elif names and all(name.endswith(".npy") for name in names):
+                what, read_by = "is an archive of NumPy arrays", "npz"
+        if read_by != wanted:
+            raise MappingError(
+                f"{shown} {what}, where `format: {wanted}` is expected.",
+                hint=f"Write `format: {read_by}` under `read`." if read_by else step.replace("FILE", shown),
+            )
+
+
+@contextmanager
+def whole(shown: str, what: str, hint: str) -> Iterator[None]:
+    """Return a context that turns whatever a damaged file makes of a library into MappingError."""
+    try:
+        yield
+    except MappingError:
+        raise
+    except Exception as error:
+        raise MappingError(f"{shown} is no whole {what}: {type(error).__name__}: {error}.", hint=hint) from error
+
+
+def extra(name: str, shown: str, *modules: str) -> list[Any]:
+    """Return modules that an extra installs; raises MappingError, which names it, if they cannot be imported."""
+    try:
+        return [importlib.import_module(module) for module in modules]
+    except ImportError as error:
+        raise MappingError(
+            f"{shown} needs an extra: {error}.", hint=f"Install it: `pip install 'tactbench[{name}]'`."
+        ) from error
+
+
+def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, Table]]:
+    """Yield the table of each recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
+
+    `known` are the words of the path, which are filled into the names of further files.
+
+    Raises
+    ------
+    MappingError
+        If the file has another format or lacks an array, or an array has the wrong shape or type.
+    """
+    hint = "Store plain arrays (numpy.save, numpy.savez, -v7 of MATLAB); pickled objects are refused."
+    names = {name: fill(name, known, shown) for name in (how.array, *how.per_recording.values())}
+    with whole(shown, f"file of `format: {how.format}`", hint):
+        arrays = _load(path, shown, how, names)
+    values = arrays[how.array]
+    if values.ndim != len(how.axes) or values.dtype.kind not in "iufb" or not values.size:
+        raise MappingError(
+            f"{shown}: array {how.array!r} of {values.dtype} has the axes {values.shape}, where {', '.join(how.axes)} "
+            "of numbers are expected.",
+            hint="Name each axis: recording, row or channel; or name another array.",
+        )
+    order = ("recording", "row", "channel")
+    ordered = np.transpose(values, sorted(range(values.ndim), key=lambda axis: order.index(how.axes[axis])))
+    lengths = [values.shape[how.axes.index(axis)] if axis in how.axes else 1 for axis in order[:2]]
+    ordered = ordered.reshape(*lengths, -1)
+    for word, name in how.per_recording.items():
+        if arrays[name].shape != (len(ordered),):
+            raise MappingError(
+                f"{shown}: array {name!r} for {word!r} has shape {arrays[name].shape}, not ({len(ordered)},).",
+                hint="It must hold one value a recording.",
+            )
+    wide = len(str(len(ordered) - 1))
+    for index, rows in enumerate(ordered):
+        words = {word: plain(arrays[name][index].item()) for word, name in how.per_recording.items()}
+        where = f"{shown}[{f'{how.array}, ' if how.array else ''}{index}]"
+        columns: dict[Column, Any] = dict(enumerate(rows.T))
+        yield {"index": f"{index:0{wide}d}", **words}, Table(where, tuple(columns), range(len(rows)), columns)
+
+
+def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, npt.NDArray[Any]]:
+    """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
+    with ExitStack() as stack:
+        if how.format == "npy":
+            opened = {name: path.parent / file if file else path for name, file in names.items()}
+            return {name: np.lib.format.read_array(stack.enter_context(one.open("rb")), allow_pickle=False)
+                    for name, one in opened.items()}  # fmt: skip
+        if how.format == "mat":
+            io: Any = importlib.import_module("scipy.io")
+            there, archive = [name for name, *_ in io.whosmat(path)], io.loadmat(path, variable_names=[*names])
+        else:
+            archive = stack.enter_context(np.load(stack.enter_context(path.open("rb")), allow_pickle=False))
+            there = archive.files
+        for name in names:
+            if name not in there:
+                hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
+                raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+        if how.format == "npz":
+            return {name: archive[name] for name in names}
+        return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
+
+
+def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+    """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
+    if axes == 1 and values.ndim == 2 and 1 in values.shape:
+        return values.reshape(-1)
+    return values.reshape(values.shape + (1,) * (axes - values.ndim))
+
+
+def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
+    """Return the table in one sheet of a workbook, with the values that Excel has stored for its formulas.
+
+    Raises
+    ------
+    MappingError
+        If openpyxl is not installed, the file is no workbook, the sheet is not in it, or it is empty.
+    """
+    (openpyxl,) = extra("xlsx", shown, "openpyxl")
+    hint = "Open it and save the sheet as CSV."
+    with whole(shown, "Excel workbook", hint), warnings.catch_warnings(), path.open("rb") as opened:
+        warnings.simplefilter("ignore")  # styles and extensions that openpyxl does not know
+        book = openpyxl.load_workbook(opened, read_only=True, data_only=True)
+        names = book.sheetnames
+        name = names[0] if how.sheet is None and len(names) == 1 else how.sheet
+        if name not in names:
+            raise MappingError(
+                f"{shown} has {len(names)} sheets, none called {name!r}.",
+                hint=f"Write `sheet:` with one of: {', '.join(names)}.",
+            )
+        lines = []
+        for number, row in enumerate(book[name].iter_rows(values_only=True)):
+            cells = [] if skipped(number, how) else [_text(value) for value in row]
+            if cells and how.comment and cells[0].startswith(how.comment):
+                continue
+            while cells and not cells[-1]:
+                cells.pop()
+            if cells:
+                lines.append((number + 1, cells))
+    wide = len(lines[0][1]) if lines else 0
+    return table_of(shown, [(number, cells + [""] * (wide - len(cells))) for number, cells in lines], how)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    return value.isoformat() if isinstance(value, date | time) else plain(value)
+
+
+def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
+    """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
+
+    Raises
+    ------
+    MappingError
+        If pyarrow is not installed, the file is damaged or empty, lacks a column, lists differ in length, or there are
+        no numbers where numbers are expected.
+    """
+    arrow, parquet, compute = extra("parquet", shown, "pyarrow", "pyarrow.parquet", "pyarrow.compute")
+    wanted = {part for column in map(str, used.columns) for part in (column, column.rpartition(".")[0])}
+    with whole(shown, "Parquet file", "Get it again."):
+        names = parquet.read_schema(path).names
+        read = parquet.read_table(path, columns=[one for one in names if one in wanted])
+    if not read.num_rows:
+        raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
+    found: dict[str, Any] = {}
+    for name in read.column_names:
+        column = read.column(name)
+        if not any(
+            getattr(arrow.types, f"is_{kind}")(column.type) for kind in ("list", "large_list", "fixed_size_list")
+        ):
+            found[name] = column
+            continue
+        lengths = compute.list_value_length(column).unique().to_pylist()
+        if len(lengths) > 1:
+            raise MappingError(
+                f"{shown}: the lists of {name!r} have {lengths[0]} values, and {lengths[1]}.",
+                hint="Only lists of one length are read.",
+            )
+        found |= {f"{name}.{place}": compute.list_element(column, place) for place in range(lengths[0])}
+    every = (*found, *(name for name in names if name not in read.column_names))
+    values: dict[Column, Any] = {}
+    for column in used.columns:
+        if str(column) not in found:
+            raise no_column(shown, str(column), every)
+        one = found[str(column)]
+        try:
+            if used.as_float(column):
+                values[column] = one.cast("float64").to_numpy(zero_copy_only=False)
+            else:
+                values[column] = (one.cast("string") if arrow.types.is_timestamp(one.type) else one).to_pylist()
+        except arrow.ArrowException as error:
+            hint = f"Name another column; {error}."
+            raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
+    return Table(shown, every, range(read.num_rows), values)
