@@ -1,4 +1,4 @@
-"""Descriptors: what a plugin brings, with the place of its code, so that listing loads none of it."""
+"""Descriptors of what a plugin brings. They name the place of its code, so that a listing imports none of it."""
 
 from __future__ import annotations
 
@@ -19,18 +19,33 @@ EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
 class ManualFrame(Frozen):
-    """A frame of a byte stream, copied from the maker's manual.
-
-    A mistake that a driver and an emulator of one author share, as a byte order, shows against it alone.
-    """
+    """A frame of a byte stream from the maker's manual, which shows a mistake that driver and emulator share."""
 
     data: str = Field(pattern=r"^([0-9A-Fa-f]{2}\s*)+$")
-    """In hexadecimal."""
+    """Bytes of the frame in hexadecimal."""
     readings: dict[str, float] = Field(min_length=1)
-    """What the manual says it holds: channel -> reading, in the channel's unit."""
+    """Readings that the manual states for the frame, by channel, in the channel's unit."""
 
 
-class SensorDescriptor(Frozen):
+class _Named(Frozen):
+    name: str = Field(pattern=_NAME)
+    title: str
+
+
+class _Emulated(Frozen):
+    emulator: str | None = Field(default=None, pattern=WHERE)
+    """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
+    :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
+    emulated_link: EmulatedLink | None = None
+    """Kind of link that the driver uses; needed where there is an emulator."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """Options of the driver that only the papers of a real device state, with their values for the emulated device.
+    They hold where a rig file leaves them out."""
+    manual_frame: ManualFrame | None = None
+    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
+
+
+class SensorDescriptor(_Emulated):
     """A sensor, and the places of its code."""
 
     spec: SensorSpec
@@ -38,19 +53,8 @@ class SensorDescriptor(Frozen):
     """``module:callable`` -> :class:`tactbench.plugin.simulation.Transducer`; needed on the twin only."""
     driver: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; for real devices."""
-    emulator: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
-    :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
-    emulated_link: EmulatedLink | None = None
-    """Kind of link that the driver uses; needed where there is an emulator."""
     log_reader: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
-    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """Options of the driver that only the papers of a real device state, with their values for the emulated device.
-    They hold where a rig file leaves them out."""
-    manual_frame: ManualFrame | None = None
-    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
-
     effects: tuple[str, ...] = ()
     """Names of effects of other packages, or of the sensor's own, that are candidates wherever it is simulated."""
 
@@ -60,24 +64,14 @@ class SensorDescriptor(Frozen):
         return self.spec.name
 
 
-class DeviceDescriptor(Frozen):
+class DeviceDescriptor(_Emulated, _Named):
     """A device other than a tactile sensor, such as a force sensor or a motor, and the places of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     kind: Literal["force", "motor"]
     """Use of the device in a rig. The streams of a force sensor have channels of kind `force`."""
     driver: str = Field(pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; of a motor, what its
     rig expects."""
-    emulator: str | None = Field(default=None, pattern=WHERE)
-    """The same as of a sensor."""
-    emulated_link: EmulatedLink | None = None
-    """The same as of a sensor."""
-    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """The same as of a sensor."""
-    manual_frame: ManualFrame | None = None
-    """The same as of a sensor."""
 
 
 class TaskDescriptor(Frozen):
@@ -91,11 +85,9 @@ class TaskDescriptor(Frozen):
         return self.spec.name
 
 
-class RigDescriptor(Frozen):
+class RigDescriptor(_Named):
     """A rig, and the places of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
@@ -122,11 +114,9 @@ class RigDescriptor(Frozen):
     real time. None: devices sense what a simulated rig has recorded."""
 
 
-class EstimatorDescriptor(Frozen):
+class EstimatorDescriptor(_Named):
     """An estimator, and the place of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     kinds: tuple[Literal["regression", "classification", "events"], ...]
     """Kinds of tasks that it answers. For `events`, ``fit`` is given 0 or 1 for each frame (whether it slips) and
     ``predict`` returns a score for each: an alarm needs one at or above a threshold."""
@@ -163,17 +153,13 @@ class EstimatorDescriptor(Frozen):
     @model_validator(mode="after")
     def _nothing_is_searched_of_detectors(self) -> EstimatorDescriptor:
         if "events" in self.kinds and (self.grid or self.window_grid != (0,)):
-            raise ValueError(
-                "kind events chooses a threshold on validation recordings, and neither grid nor window_grid"
-            )
+            raise ValueError("kind events has neither grid nor window_grid: only its threshold is chosen")
         return self
 
 
-class EffectDescriptor(Frozen):
+class EffectDescriptor(_Named):
     """A physical influence that a simulation may include."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``; imported only when a plan includes the effect."""
     produces: tuple[str, ...] = ()
@@ -184,11 +170,9 @@ class EffectDescriptor(Frozen):
     """Names of groups of effects in a scene's ``simulation.effects``: ``drift``, ``noise``."""
 
 
-class IndenterDescriptor(Frozen):
+class IndenterDescriptor(_Named):
     """A shape of an indenter, and the place of the code for its height."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(x_mm, y_mm, **dimensions)`` with two arrays that broadcast: the height
     of the body above its lowest point [mm], finite everywhere and 0 at (0, 0). Where a flank is vertical, or there is
@@ -207,11 +191,9 @@ class IndenterDescriptor(Frozen):
         return values_of(f"The indenter {self.name!r}", self.dimensions, given)
 
 
-class ProfileDescriptor(Frozen):
+class ProfileDescriptor(_Named):
     """A named profile of the normal force, and the place of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. A scene, and
     with it a recording, holds this path and not the profile's name."""
