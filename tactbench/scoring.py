@@ -34,8 +34,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.spec.declared_task import FILE
-from tactbench.core.spec.row import DIRECTIONS
-from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.row import DIRECTIONS, STOPPED
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.study.progress import progress
 from tactbench.recordings import Recordings, opened_as

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from pydantic import Field, model_validator
 
@@ -46,38 +46,22 @@ class Parameter(Frozen):
 def values_of(what: str, parameters: Mapping[str, Parameter], given: Mapping[str, Quantity]) -> dict[str, float]:
     """Return the value of each of `parameters` in its own unit: `given`, or its default.
 
-    Parameters
-    ----------
-    what
-        Whose they are, for messages: ``The indenter 'pin'``.
-
-    Raises
-    ------
-    UsageError
-        Naming the first that `what` does not have, whose unit is another one, or whose value is out of range.
+    Raises UsageError, which begins with `what` (``The indenter 'pin'``), for a name that is not among `parameters`, a
+    unit of another dimension, or a value out of range.
     """
-    check_names(what, parameters, given)
+    for name in sorted(given.keys() - parameters.keys()):
+        known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
+        raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")
     values = {}
     for name, parameter in parameters.items():
         try:
             value = given[name].to(parameter.unit) if name in given else parameter.default
         except UsageError as error:
-            raise UsageError(
-                f"{what}: {name} is given as {given[name]}, and a number in {parameter.unit} is expected.",
-                hint=f"It is: {parameter.text}",
-            ) from error
+            raise UsageError(f"{what}: {name}: {error.message}", hint=f"It is: {parameter.text}") from error
         if not parameter.allows(value):
             raise UsageError(
-                f"{what}: {name} is given as {given.get(name, value)}, and {parameter.range} is expected.",
+                f"{what}: {name} is given as {given[name]}, and {parameter.range} is expected.",
                 hint=f"It is: {parameter.text}",
             )
         values[name] = value
     return values
-
-
-def check_names(what: str, parameters: Mapping[str, Parameter], given: Iterable[str]) -> None:
-    """Raise UsageError for the first of the names `given` that is not one of `parameters`."""
-    for name in given:
-        if name not in parameters:
-            known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
-            raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")

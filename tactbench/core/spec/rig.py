@@ -183,11 +183,11 @@ class IndenterDescriptor(_Named):
     @model_validator(mode="after")
     def _angle_is_the_scenes(self) -> IndenterDescriptor:
         if "angle" in self.dimensions:
-            raise ValueError("dimensions: angle is how a scene turns the shape; call it something else")
+            raise ValueError("dimensions: a scene turns the shape by `angle`; rename this one")
         return self
 
     def sizes(self, given: Mapping[str, Quantity]) -> dict[str, float]:
-        """Return every dimension, each in its unit: as `given`, or by default; raises UsageError naming one."""
+        """Return every dimension in its unit: as `given`, or its default; raises UsageError for a wrong one."""
         return values_of(f"The indenter {self.name!r}", self.dimensions, given)
 
 
@@ -201,5 +201,5 @@ class ProfileDescriptor(_Named):
     """Parameters, each passed as a keyword in its own unit."""
 
     def values(self, given: Mapping[str, Quantity]) -> dict[str, float]:
-        """Return every parameter, each in its unit: as `given`, or by default; raises UsageError naming one."""
+        """Return every parameter in its unit: as `given`, or its default; raises UsageError for a wrong one."""
         return values_of(f"The profile {self.name!r}", self.parameters, given)

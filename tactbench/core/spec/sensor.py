@@ -99,19 +99,15 @@ class Creep(Frozen):
     """Its time constant [time]."""
 
 
-_NONE_STATED = "the sensor states none"
-_NO_COUNTS = assumed(0.0, "count", _NONE_STATED)
-_NO_SHARE = assumed(0.0, "1", _NONE_STATED)
+_NO_COUNTS, _NO_SHARE = (assumed(0.0, unit, "the sensor states none") for unit in ("count", "1"))
 _ANY_TIME = assumed(1.0, "s", "without effect")
 
 
 class Nuisances(Frozen):
     """Noise, drift and scatter of all channels of one kind, which a simulation adds to the physics.
 
-    Amounts are in the channel's own unit, ``count`` for raw readings, and added to readings as they are. Shares are in
-    1, time constants in a time.
-
-    What is left out is 0; a warm-up or a wander needs its time constant.
+    Amounts are in the channel's own unit, ``count`` for raw readings. An amount that is left out is 0; a warm-up or a
+    wander needs its time constant.
     """
 
     white: Quantity = _NO_COUNTS
@@ -158,19 +154,15 @@ class Nuisances(Frozen):
     def _has_its_time_constants(self) -> Nuisances:
         for name in ("warm_up", "wander"):
             if getattr(self, name).value and f"{name}_tau" not in self.model_fields_set:
-                raise ValueError(f"{name} is not 0, so {name}_tau is needed, the time constant of it")
+                raise ValueError(f"{name} is not 0, so {name}_tau is needed")
         return self
 
     def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
         """Return every amount with its field, by its name in settings of a run: ``taxel_white_count``."""
-        stated = {field: getattr(self, field) for field in type(self).model_fields if field != "creep"}
+        stated = {field: one for field, one in self if isinstance(one, Quantity)}
         for place, term in enumerate(self.creep, start=1):
             stated |= {f"creep_{place}_fraction": term.fraction, f"creep_{place}_tau": term.tau}
-        return {
-            units.with_unit(f"{kind}_{field}", one.unit): (field, one)
-            for field, one in stated.items()
-            if one is not None
-        }
+        return {units.with_unit(f"{kind}_{field}", one.unit): (field, one) for field, one in stated.items()}
 
     def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
         """Return these nuisances with other `values`, by name; names of others are ignored.
@@ -181,22 +173,16 @@ class Nuisances(Frozen):
             If an amount cannot have its value.
         """
         known = self.by_name(kind)
-        given = {field: getattr(self, field) for field in self.model_fields_set}
-        creep = [term.model_dump() for term in self.creep]
-        for name, value in values.items():
-            if name not in known:
-                continue
-            field, old = known[name]
+        data = self.model_dump(exclude_unset=True)
+        for name in values.keys() & known.keys():
+            (field, old), value = known[name], values[name]
             if value < 0 and field != "warm_up":
                 raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
-            new = assumed(value, old.unit, "set for this run")
-            if field.startswith("creep_"):
-                _, place, part = field.split("_")
-                creep[int(place) - 1][part] = new
-            else:
-                given[field] = new
+            of, place, part = field.split("_") if field.startswith("creep_") else ("", "1", field)
+            inside = data["creep"][int(place) - 1] if of else data
+            inside[part] = assumed(value, old.unit, "set for this run")
         try:
-            return Nuisances.model_validate({**given, "creep": creep})
+            return Nuisances.model_validate(data)
         except ValidationError as error:
             raise UsageError(f"{kind}: {complaint(error)}.", hint="Set that as well.") from error
 
@@ -282,22 +268,15 @@ class SensorSpec(Frozen):
     """Facts about the device. They are left out of recordings and keys, as no sample depends on them."""
 
     @model_validator(mode="after")
-    def _names_are_unique(self) -> SensorSpec:
+    def _names_and_places_agree(self) -> SensorSpec:
         for what, several in (("channel", self.channels()), ("stream", self.streams)):
             names = [one.name for one in several]
-            doubled = sorted({name for name in names if names.count(name) > 1})
-            if doubled:
+            if doubled := sorted({name for name in names if names.count(name) > 1}):
                 raise ValueError(f"{what} names must be unique in a sensor; repeated: {', '.join(doubled)}")
-        return self
-
-    @model_validator(mode="after")
-    def _a_site_is_one_place(self) -> SensorSpec:
         for first, *others in self.sites():
             for one in others:
                 if (one.position_m, one.normal) != (first.position_m, first.normal):
-                    raise ValueError(
-                        f"site {one.site}: the place of {one.name} is not that of {first.name}; a site is one place"
-                    )
+                    raise ValueError(f"site {one.site}: {one.name} and {first.name} state different places")
         return self
 
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:
@@ -307,11 +286,9 @@ class SensorSpec(Frozen):
 
     def sites(self, *kinds: ChannelKind) -> tuple[tuple[ChannelSpec, ...], ...]:
         """Return the channels of the given kinds by place: those of a site together, each other one alone."""
-        found: dict[tuple[str, str], list[ChannelSpec]] = {}
-        for channel in self.channels(*kinds):
-            found.setdefault(("channel", channel.name) if channel.site is None else ("site", channel.site), []).append(
-                channel
-            )
+        found: dict[tuple[str | None, str], list[ChannelSpec]] = {}
+        for one in self.channels(*kinds):
+            found.setdefault((one.site, "" if one.site else one.name), []).append(one)
         return tuple(map(tuple, found.values()))
 
     def settable(self) -> dict[str, Quantity]:

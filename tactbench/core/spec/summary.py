@@ -38,7 +38,7 @@ class Summary(Frozen):
             raise ValueError("a window in shares of a recording ends at 1 at the latest; set unit: s for seconds")
         if (self.measure == "band-energy") != (self.band_hz is not None):
             raise ValueError("band_hz belongs to band-energy, which needs it")
-        if self.band_hz is not None and not 0 < self.band_hz[0] < self.band_hz[1]:
+        if self.band_hz and not 0 < self.band_hz[0] < self.band_hz[1]:
             raise ValueError("a band's lower end is above 0 Hz and below its upper end")
         return self
 
