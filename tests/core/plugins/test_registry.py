@@ -118,7 +118,7 @@ BAD = {
     "raises": ("raise RuntimeError('no vendor library')", "RuntimeError: no vendor library"),
     "no-version": ("", "TACTBENCH_API"),
     "no-hook": (HEAD, "implements none"),
-    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "no hook.*tactbench_devices"),
+    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "tactbench_device"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),
     "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), r"ZeroDivisionError.*\(hook_raises.py, line \d"),
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
@@ -167,7 +167,7 @@ def test_where_no_rig_is_named_one_of_ours_is_meant():
     for name, module in (("a", "other.rigs"), ("b", "tactbench.rigs.b"), ("c", "other.rigs")):
         registry.rigs.add(Owned(RigDescriptor(name=name, title=name, where="x:y", simulated=True), module, "made", "1"))
     assert registry.first_rig("simulated") == "b"
-    with pytest.raises(UsageError, match="No rig that replays"):
+    with pytest.raises(UsageError, match="'replays'"):
         registry.first_rig("replays")
 
 
