@@ -44,15 +44,7 @@ if TYPE_CHECKING:
 
 
 class TactbenchError(Exception):
-    """Root of all errors of tactbench.
-
-    Parameters
-    ----------
-    message
-        What was given and what was expected, in one sentence.
-    hint
-        The next step for the reader, in one sentence.
-    """
+    """Root of all errors of tactbench: a message of what was given and expected, and a hint at the next step."""
 
     exit_code = 1
     traceback_text = ""
@@ -79,7 +71,7 @@ def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchEr
 
 
 def error_text(error: BaseException) -> str:
-    """Return an error as text: its message, with the class where that is not one of tactbench's."""
+    """Return the message of an error, behind its class where that is not one of tactbench's."""
     return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}".rstrip(": ")
 
 
@@ -98,13 +90,13 @@ def nearest(given: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """Return a question for the names of `known` that look like `given`, and a blank; empty if none does."""
+    """Return ``Did you mean …? `` for the names of `known` that look like `given`; empty if none does."""
     close = " or ".join(map(repr, nearest(given, known)))
     return f"Did you mean {close}? " if close else ""
 
 
 def complaint(error: ValidationError) -> str:
-    """Return the first complaint of pydantic: where, what is wrong there, and what was given."""
+    """Return the first complaint of pydantic as ``place: message (given: value)``."""
     first = error.errors(include_url=False)[0]
     place, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
@@ -112,7 +104,7 @@ def complaint(error: ValidationError) -> str:
 
 
 def wrong(argument: str, given: object, takes: str) -> UsageError:
-    """Return the error of a function in Python that was given something that its argument does not take."""
+    """Return the error of a function in Python for a value that its argument does not take."""
     shown = repr(given) if isinstance(given, str | type) else reprlib.repr(given)
     shown += f" of shape {given.shape}" if hasattr(given, "shape") else ""
     return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
@@ -225,21 +217,16 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
 
     Parameters
     ----------
-    message, hint
+    message, hint, traceback_text
         As of every error.
     signal
-        Number of the signal that ended its process, if one did.
+        Number of the signal that ended its process; None: no signal did.
     log
-        The end of what it had printed.
-    traceback_text
-        Where it was, as far as that is known.
-
-    Attributes
-    ----------
-    spent_s
-        Seconds until it ended; None: not known.
+        The end of its output.
     """
 
+    spent_s: float | None = None
+    """Time until it ended [s]; None: not known."""
     status: Literal["failed", "crashed", "timeout", "out-of-memory"] = "crashed"
 
     def __init__(
@@ -248,7 +235,6 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
         super().__init__(message, hint=hint)
         self.signal = signal
         self.log = log
-        self.spent_s: float | None = None
         self.traceback_text = traceback_text
 
 
