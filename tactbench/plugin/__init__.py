@@ -20,7 +20,6 @@ from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, FloatArray, Quality, StreamReadings
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.profile import ForcePath, ForceRamp
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
@@ -28,6 +27,7 @@ from tactbench.core.spec.rig import (
     EstimatorDescriptor,
     IndenterDescriptor,
     ManualFrame,
+    Parameter,
     ProfileDescriptor,
     RigDescriptor,
     SensorDescriptor,
@@ -43,8 +43,15 @@ from tactbench.core.spec.sensor import (
     Statement,
     StreamSpec,
 )
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
+from tactbench.core.spec.task import (
+    ChannelTarget,
+    LabelTarget,
+    PlannedScene,
+    Published,
+    Summary,
+    TaskSpec,
+    VectorTarget,
+)
 
 __all__ = [
     "API_VERSION",

@@ -9,8 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from tactbench.core.errors import complaint
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.sensor import ChannelKind
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, TaskSpec, VectorTarget
+from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, Summary, TaskSpec, VectorTarget
 
 FILE = "tasks.yaml"
 """Name of the file of these tasks beside the recordings."""

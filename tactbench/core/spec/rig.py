@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from tactbench.core.spec.parameter import Parameter, values_of
-from tactbench.core.spec.quantity import Frozen, Quantity
+from tactbench.core.errors import UsageError
+from tactbench.core.spec.quantity import Frozen, Quantity, Unit
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import WHERE, TaskSpec
+from tactbench.core.spec.task import WHERE, Summary, TaskSpec
 
 _NAME = r"^[a-z][a-z0-9_-]*$"
 EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
@@ -95,31 +95,30 @@ class RigDescriptor(_Named):
     replays: bool = False
     """Whether it is a ReplayRig; one of these is used for ``--recordings`` without ``--rig``."""
     references: dict[str, tuple[str, ...]] | None = None
-    """Kinds of channels that its reference records, each with their names where they are fixed. A task that needs
-    others is refused before anything is recorded. None: they are not known beforehand."""
+    """Kinds of channels of its reference, each with their names where these are fixed, which are compared with a task's
+    needs before recording; None: they are not known beforehand."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of a simulated rig's ladder of solvers, the cheapest first."""
     verification: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called without arguments: Verdicts of the simulation against laws and closed forms."""
     work_precision: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
-    CostStudy of error against seconds per recording."""
+    """``module:callable``, called with a SensorDescriptor and ``rounds=``, a number of timed recordings: a CostStudy
+    of error against seconds per recording."""
     file: str | None = Field(default=None, pattern=WHERE)
-    """``module:class``, a RigFile that also checks the rig's own settings: complaints about them then name their
-    line."""
+    """``module:class``, a RigFile that also checks the rig's own settings, so that complaints name their line."""
     check: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a RigFile: a RigCheck of what the rig would do, with nothing opened or moved."""
     emulators: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with a RigFile and a registry: RigEmulators, whose motors move and forces answer, for
-    real time. None: devices sense what a simulated rig has recorded."""
+    """``module:callable``, called with a RigFile and a registry: RigEmulators with moving motors, for real time. None:
+    emulated devices read the samples of a simulated rig."""
 
 
 class EstimatorDescriptor(_Named):
     """An estimator, and the place of its code."""
 
     kinds: tuple[Literal["regression", "classification", "events"], ...]
-    """Kinds of tasks that it answers. For `events`, ``fit`` is given 0 or 1 for each frame (whether it slips) and
-    ``predict`` returns a score for each: an alarm needs one at or above a threshold."""
+    """Kinds of tasks that it answers. For `events`, ``fit`` takes 0 or 1 for each frame (whether it slips) and
+    ``predict`` returns a score for each, which raises an alarm at or above a threshold."""
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
@@ -130,14 +129,14 @@ class EstimatorDescriptor(_Named):
     window_grid: tuple[int, ...] = (0,)
     """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
     looks_at: Literal["features", "time", "nothing", "reference"] = "features"
-    """`time`: X is the time index alone. `nothing`: X is a column of zeros. `reference`, of events alone: X is the
-    tangential force over friction times normal force, from the reference sensor: an oracle."""
+    """`time`: X is the time index. `nothing`: X is a column of zeros. `reference`, for events only: X is the tangential
+    force over friction times normal force, from the reference sensor: an oracle."""
     summaries: tuple[Summary, ...] = ()
     """Numbers of each channel that it uses for frames, in place of the task's own."""
     frames_by: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable`` for features of frames in place of summaries, called with (one stream, a
-    :class:`tactbench.plugin.StreamReadings`; (n,) ends of frames [s]; length of a frame [s]): (n, features) numbers of
-    the samples up to each end, NaN where there is no answer. Only the fastest stream is passed."""
+    """``module:callable`` for features of frames in place of summaries, called with (the fastest stream as
+    :class:`tactbench.plugin.StreamReadings`, (n,) ends of frames [s], length of a frame [s]): (n, features) numbers of
+    the samples up to each end, NaN where there is no answer."""
     threshold: float | None = None
     """Threshold of its own for events; None: it is chosen on validation recordings."""
     baseline: bool = False
@@ -147,8 +146,8 @@ class EstimatorDescriptor(_Named):
     distributions: tuple[str, ...] = ()
     """Distributions beside tactbench that compute its answers; the key of a cell covers their versions."""
     rehearsal: dict[str, Any] | None = None
-    """Parameters with which it fits a few rows at once and leaves no thread behind. It then does so before cells are
-    timed, so that the first use of its library is in no time. None: it is only built."""
+    """Parameters of a short fit before cells are timed, so that no time contains the first use of its library; None: it
+    is only built."""
 
     @model_validator(mode="after")
     def _nothing_is_searched_of_detectors(self) -> EstimatorDescriptor:
@@ -170,13 +169,68 @@ class EffectDescriptor(_Named):
     """Names of groups of effects in a scene's ``simulation.effects``: ``drift``, ``noise``."""
 
 
+class Parameter(Frozen):
+    """A parameter of a shape or of a force profile."""
+
+    default: float
+    """Value that is taken where a scene gives none, in `unit`."""
+    unit: Unit
+    """Unit in which the plugin's code receives the value."""
+    text: str = Field(pattern=r"^\S[^\n]*$")
+    """Description in one line."""
+    least: float = 0.0
+    """Smallest value that may be given, in `unit`."""
+    most: float | None = None
+    """Largest value that may be given, in `unit`; None: there is no such limit."""
+
+    @model_validator(mode="after")
+    def _default_may_be_given(self) -> Parameter:
+        if not self.allows(self.default):
+            raise ValueError(f"default: {self.default:g} is given, and {self.range} is expected")
+        return self
+
+    def allows(self, value: float) -> bool:
+        """Return whether `value`, in `unit`, may be given."""
+        return math.isfinite(value) and self.least <= value and (self.most is None or value <= self.most)
+
+    @property
+    def range(self) -> str:
+        """The range of values in words: ``0.5 to 3 mm``."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        upper = "" if self.most is None else f" to {self.most:g}"
+        return f"{self.least:g}{upper}{unit}{'' if upper else ' or more'}"
+
+
+def _values(what: str, parameters: Mapping[str, Parameter], given: Mapping[str, Quantity]) -> dict[str, float]:
+    """Return the value of each of `parameters` in its own unit: `given`, or its default.
+
+    Raises UsageError, which begins with `what` (``The indenter 'pin'``), for a name that is not among `parameters`, a
+    unit of another dimension, or a value out of range.
+    """
+    for name in sorted(given.keys() - parameters.keys()):
+        known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
+        raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")
+    values = {}
+    for name, parameter in parameters.items():
+        try:
+            value = given[name].to(parameter.unit) if name in given else parameter.default
+        except UsageError as error:
+            raise UsageError(f"{what}: {name}: {error.message}", hint=f"It is: {parameter.text}") from error
+        if not parameter.allows(value):
+            raise UsageError(
+                f"{what}: {name} is given as {given[name]}, and {parameter.range} is expected.",
+                hint=f"It is: {parameter.text}",
+            )
+        values[name] = value
+    return values
+
+
 class IndenterDescriptor(_Named):
     """A shape of an indenter, and the place of the code for its height."""
 
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(x_mm, y_mm, **dimensions)`` with two arrays that broadcast: the height
-    of the body above its lowest point [mm], finite everywhere and 0 at (0, 0). Where a flank is vertical, or there is
-    no body, it is large: 50 mm or more."""
+    of the body above its lowest point [mm], finite everywhere, 0 at (0, 0), 50 mm or more where there is no body."""
     dimensions: dict[str, Parameter] = Field(default_factory=dict)
     """Parameters, each passed as a keyword in its own unit."""
 
@@ -188,7 +242,7 @@ class IndenterDescriptor(_Named):
 
     def sizes(self, given: Mapping[str, Quantity]) -> dict[str, float]:
         """Return every dimension in its unit: as `given`, or its default; raises UsageError for a wrong one."""
-        return values_of(f"The indenter {self.name!r}", self.dimensions, given)
+        return _values(f"The indenter {self.name!r}", self.dimensions, given)
 
 
 class ProfileDescriptor(_Named):
@@ -202,4 +256,4 @@ class ProfileDescriptor(_Named):
 
     def values(self, given: Mapping[str, Quantity]) -> dict[str, float]:
         """Return every parameter in its unit: as `given`, or its default; raises UsageError for a wrong one."""
-        return values_of(f"The profile {self.name!r}", self.parameters, given)
+        return _values(f"The profile {self.name!r}", self.parameters, given)

@@ -105,8 +105,7 @@ class Environment(Frozen):
     )
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
-    """Factor on the white noise of the sensor; docs/calibration.md has the factors that agree with the paper's
-    figures."""
+    """Factor on the white noise of the sensor; docs/calibration.md has those that agree with the paper's figures."""
     drift_scale: float = Field(default=1.0, ge=0)
     """Factor on wander and warm-up, and on offsets where these have no factor of their own."""
     offset_scale: float | None = Field(default=None, ge=0)
@@ -123,7 +122,7 @@ class Environment(Frozen):
     """Temperature of the room [degC]."""
     indenter_temperature: Quantity | None = None
     """Temperature of the indenter [degC]; None: that of the surface which it touches, so that no heat flows. No source
-    states it: a cap that lies in the room has the temperature of the room."""
+    states it; a cap may have the temperature of the room."""
 
     @property
     def scale_of_offsets(self) -> float:
@@ -141,8 +140,7 @@ class Surface(Frozen):
     kinetic_friction: Quantity = assumed(0.65, "1", "a sixth below the static coefficient; no source for this skin")
     """Ratio of tangential to normal force at speeds far above `stribeck_speed` [1]."""
     stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
-    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb's two
-    coefficients)."""
+    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb)."""
     roughness: Quantity = measured(
         73.0,
         "um",
@@ -221,14 +219,12 @@ class Simulation(Frozen):
     rung: str | None = None
     """Name of a rung of the ladder of solvers; None: the default one."""
     tolerance: float | None = Field(default=None, gt=0)
-    """Largest error of an observed channel, in its own unit, by which the cheapest rung is chosen. None: that of the
-    rung."""
+    """Largest error of an observed channel, in its unit, which chooses the cheapest rung; None: that of the rung."""
     scenario: str | None = None
     """Name of a scenario of the sensor, whose nuisances replace the usual ones; None: the usual ones hold."""
 
     nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
-    """Values that replace those of the scene or the sensor, by the name of the nuisance: ``placement_scatter_mm:
-    0.3``."""
+    """Values of nuisances in place of the scene's or the sensor's, by name: ``placement_scatter_mm: 0.3``."""
 
     @field_serializer("nuisances")
     def _as_mapping(self, nuisances: tuple[tuple[str, float], ...]) -> dict[str, float]:
@@ -283,12 +279,9 @@ class Scene(Frozen):
         return found
 
     def with_nuisances(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with other `values` of nuisances, by name; names of other parts than a scene's are ignored.
+        """Return the scene with other `values` of its nuisances, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If a nuisance cannot have its value, or the scene lacks the part that it is of.
+        Raises UsageError if a nuisance cannot have its value, or the scene has no such part.
         """
         given = {name: value for name, value in values.items() if name in NUISANCES}
         data = self.model_dump()

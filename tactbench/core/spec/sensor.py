@@ -61,13 +61,13 @@ class ChannelSpec(Frozen):
     sign: Literal[-1, 0, 1] = 0
     """Sign of the response: +1 if the reading rises under load, -1 if it falls, 0 if it does either or is not known."""
     position_m: Vector | None = None
-    """Place (x, y, z) on the sensor [m], in the sensor's frame: x along the finger towards the tip, y across, -z to the
-    pad that is pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
+    """Place (x, y, z) in the sensor's frame [m]: x along the finger towards the tip, y across, -z to the pad that is
+    pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
     normal: Vector | None = None
     """Outward unit normal at that place."""
     site: str | None = Field(default=None, min_length=1)
-    """Name of the place where several channels share it, as the axes of one magnet do; they state one position and
-    normal. None: the channel has a place of its own."""
+    """Name of the place of several channels, as the axes of one magnet, which state one position and normal; None: the
+    channel has a place of its own."""
     position_source: Source | None = None
     """Source of position and normal."""
     scale: Quantity | None = None
@@ -91,7 +91,7 @@ class StreamSpec(Frozen):
 
 
 class Creep(Frozen):
-    """An exponential term with which the response lags behind the load."""
+    """An exponential term of the lag of the response behind the load."""
 
     fraction: Share
     """Share of the response that arrives late [1]."""
@@ -165,12 +165,9 @@ class Nuisances(Frozen):
         return {units.with_unit(f"{kind}_{field}", one.unit): (field, one) for field, one in stated.items()}
 
     def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
-        """Return these nuisances with other `values`, by name; names of others are ignored.
+        """Return these nuisances with other `values`, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If an amount cannot have its value.
+        Raises UsageError if an amount cannot have its value.
         """
         known = self.by_name(kind)
         data = self.model_dump(exclude_unset=True)
@@ -227,7 +224,7 @@ class DataSheet(Frozen):
     availability: Statement | None = None
     """Availability of the device."""
     exists: bool = True
-    """Whether there is such a device; a mere definition is left out by `tactbench choose`."""
+    """Whether there is such a device; `tactbench choose` leaves out mere definitions."""
 
     @model_validator(mode="after")
     def _has_its_units(self) -> DataSheet:
@@ -253,7 +250,7 @@ class SensorSpec(Frozen):
     """Skin for simulation; None: the sensor can only be recorded or replayed."""
     reads_shear: tuple[ChannelKind, ...] = ()
     """Kinds of channels whose transducer uses `tangential_displacement_mm` and `shear_mpa` of a SkinState, which are
-    computed only where such a channel is observed."""
+    not computed otherwise."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
     """Parameters of the sensor's own transduction."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
@@ -261,8 +258,8 @@ class SensorSpec(Frozen):
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
     """Ways of handling that the usual nuisances do not cover, by name; a scene's simulation selects one."""
     ranges: dict[str, PhysicalRange] = Field(default_factory=dict, exclude=True)
-    """Ranges of nuisances by their names in settings of a run: of the sensor's own, and of a scene's factors on them.
-    They are left out of recordings and keys, as no sample depends on them."""
+    """Ranges of nuisances, and of a scene's factors on them, by their names in settings of a run. They are left out of
+    recordings and keys, as no sample depends on them."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
     """Facts about the device. They are left out of recordings and keys, as no sample depends on them."""
@@ -296,12 +293,9 @@ class SensorSpec(Frozen):
         return {name: amount for kind, own in self.nuisances.items() for name, (_, amount) in own.by_name(kind).items()}
 
     def with_nuisances(self, values: Mapping[str, float]) -> SensorSpec:
-        """Return the spec with other `values` of its nuisances, by name; names of others are ignored.
+        """Return the spec with other `values` of its nuisances, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If a nuisance cannot have its value.
+        Raises UsageError if a nuisance cannot have its value.
         """
         if not values.keys() & self.settable().keys():
             return self
@@ -309,13 +303,7 @@ class SensorSpec(Frozen):
         return self.model_copy(update={"nuisances": nuisances})
 
     def handled(self, scenario: str | None) -> SensorSpec:
-        """Return the spec with the nuisances of one of its scenarios, or itself for None.
-
-        Raises
-        ------
-        NotApplicable
-            If the sensor states no scenario of that name.
-        """
+        """Return the spec with the nuisances of a scenario (None: the usual ones); raises NotApplicable if unknown."""
         if scenario is None:
             return self
         if scenario not in self.scenarios:

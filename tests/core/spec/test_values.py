@@ -10,8 +10,8 @@ from tactbench.core.spec import force_profiles
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import THRESHOLDS, SlipTarget, nanoseconds
 from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.quantity import assumed, derived, measured, sourced
+from tactbench.core.spec.rig import Parameter
 from tactbench.core.spec.row import lower_is_better, plural
 from tactbench.core.spec.scene import Environment, Indenter, Slide
 from tactbench.core.spec.sensor import Nuisances
