@@ -332,13 +332,13 @@ def run(
     sensor, task
         Names, one or several.
     estimator
-        Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Of objects
-        without names of estimators, only the tasks' trivial answers are run beside them.
+        Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Beside
+        objects, only the tasks' trivial answers are run.
     recordings, out
         Folder of recordings to replay, or all recordings of one; the result folder.
     data, estimators, tasks
-        Several data sets: recordings by name, estimators as of `estimator`, and one task or several. Each data set has
-        its own tables, and a result folder in `out`.
+        Recordings of several data sets by name, estimators as of `estimator`, and one task or several. Each data set
+        has its own tables, and a result folder in `out`.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
         ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated. With

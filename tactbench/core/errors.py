@@ -3,31 +3,14 @@
 ::
 
     TactbenchError
-    ├── UsageError                    a command or a call cannot be carried out: exit code 2
-    │   ├── UnknownNameError          no sensor, rig, task … of that name (carries the nearest names)
-    │   ├── ConfigError               a YAML file is not valid (carries file and line)
-    │   └── FolderError               a result folder refuses, is held by another run, or contradicts another
-    ├── PluginError                   a plugin cannot be used
-    │   ├── DuplicateNameError        two distributions give one name
-    │   └── PluginContractError       a plugin does not keep the interface it promised
-    ├── RecordingError                a recording cannot be read or written
-    │   ├── FormatError               (also ValueError) not a recording, or a damaged one
-    │   ├── MissingRecordingError     (also FileNotFoundError)
-    │   ├── UnwritableError           the place for it refuses: exit code 2
-    │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
-    ├── RigError                      a rig cannot carry out a scene
-    ├── LinkError                     a link to a device cannot be opened or used
-    │   ├── LinkClosed                it was closed
-    │   ├── LinkTimeout               nothing came, or nothing could be sent, within the time given
-    │   └── LinkUnplugged             the device, its cable or the other end is gone
-    ├── DataError                     (also ValueError) recordings cannot become X and y
-    │   └── NotApplicable             the cell is skipped, with this reason
-    ├── EngineError                   the engine that computes cells is gone, or has other versions
-    └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
-        ├── Raised                    an error of another package was raised in another process
-        ├── Crashed                   its process was ended by a signal, or ended itself
-        ├── TimedOut                  it took longer than it may
-        └── OutOfMemory               it took more memory than it may, or than there is
+    ├── UsageError: UnknownNameError, ConfigError, FolderError
+    ├── PluginError: DuplicateNameError, PluginContractError
+    ├── RecordingError: FormatError, MissingRecordingError, UnwritableError, MappingError
+    ├── RigError
+    ├── LinkError: LinkClosed, LinkTimeout, LinkUnplugged
+    ├── DataError: NotApplicable
+    ├── EngineError
+    └── CellStopped: Raised, Crashed, TimedOut, OutOfMemory
 
 Every message names what was given, what was expected and the next step.
 """
@@ -76,7 +59,7 @@ def error_text(error: BaseException) -> str:
 
 
 class UsageError(TactbenchError):
-    """A command or a call cannot be carried out as it is given."""
+    """A command or a call cannot be carried out as it is given: exit code 2."""
 
     exit_code = 2
 
@@ -111,7 +94,7 @@ def wrong(argument: str, given: object, takes: str) -> UsageError:
 
 
 class UnknownNameError(UsageError):
-    """There is no sensor, rig, task … with a given name."""
+    """There is no sensor, rig, task … with a given name; the hint has the nearest names."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
@@ -120,7 +103,7 @@ class UnknownNameError(UsageError):
 
 
 class ConfigError(UsageError):
-    """A configuration file is not valid."""
+    """A YAML file is not valid; the message begins with file and line."""
 
     def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
         where = f"{file}:{line}" if line else file
@@ -169,7 +152,7 @@ class MissingRecordingError(RecordingError, FileNotFoundError):
 
 
 class UnwritableError(RecordingError):
-    """The folder or disk that a recording shall go to refuses it."""
+    """The folder or disk of a recording refuses it."""
 
     exit_code = 2
 
