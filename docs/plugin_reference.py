@@ -31,7 +31,7 @@ RIG_FILES = {
     ),
 }
 """Chapters of ``rig-files.md`` and the modules whose models they describe."""
-_MODELS = {"Frozen", "DeviceEntry", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}
+_MODELS = {"Frozen", "DeviceEntry", "NamedDevice", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}
 """Bases of the models of a rig file."""
 _RIG_FILES_TITLE = """# Rig files
 
