@@ -110,7 +110,7 @@ def load_task(
     UsageError
         If an argument cannot be used, or these recordings cannot be split so.
     DataError
-        If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
+        If nothing is left to evaluate; its kind NotApplicable if these recordings do not have what the task needs.
     """
     options = Options(protocol, split, groups, window=window, step=step, seed=seed)
     spec, _, paths, how = question(task, recordings, options)
@@ -360,11 +360,11 @@ def run(
             raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = named(estimator)
-    asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
-    if unknown := asked.keys() - Study.model_fields:
+    given = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
+    if unknown := given.keys() - Study.model_fields:
         raise UnknownNameError("argument of `run`", min(unknown), Study.model_fields)
     try:
-        study = Study(estimator=names if names or objects else None, **asked)
+        study = Study(estimator=names if names or objects else None, **given)
     except ValidationError as error:
         raise UsageError(f"{complaint(error)}.", hint="See the options in `tactbench run --help`.") from error
     store, outcome = carry_out(study)
@@ -401,7 +401,7 @@ def _over_data(
         mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
         return next((value[name] for name in of if name in value), None) if mapped else value
 
-    asked: dict[str, dict[str, Work]] = {name: {} for name in data}
+    work_of: dict[str, dict[str, Work]] = {name: {} for name in data}
     splits: dict[tuple[Any, ...], OwnSplit] = {}
     for name, recordings in data.items():
         some = chosen(tasks, name)
@@ -420,9 +420,9 @@ def _over_data(
                             folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
                             folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
                         work.how["split"] = splits[of]
-                    asked[name].setdefault(work.cell.name, work)
+                    work_of[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
-    for name, rows in side_by_side(asked, out, jobs or usable_cores()).items():
+    for name, rows in side_by_side(work_of, out, jobs or usable_cores()).items():
         store = Store(out / name)
         table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
         write_tables(table, store.folder)

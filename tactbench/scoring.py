@@ -196,14 +196,14 @@ def named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
     return names, objects
 
 
-def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
+def side_by_side(work_of: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
     """Return the rows of cells by data set, from its result folder or evaluated in one of `jobs` processes."""
     import joblib
 
-    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in asked}
+    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in work_of}
     todo: list[tuple[str, Work, Store, str, Sections, str]] = []
     with ExitStack() as held, progress() as display:
-        for name, works in asked.items():
+        for name, works in work_of.items():
             store = held.enter_context(Store(out / name).hold())
             store.begin(gather(installed(), engine="joblib"))
             each = {work.paths for work in works.values()}
@@ -233,7 +233,7 @@ def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) 
                 f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
                 hint="Finished rows are kept. Give jobs=1 to evaluate the rest in this process.",
             ) from error
-    return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
+    return {name: [rows[name][cell] for cell in works] for name, works in work_of.items()}
 
 
 def _in_place(place: int, work: Work) -> tuple[int, Solved]:

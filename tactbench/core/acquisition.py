@@ -152,7 +152,7 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
 
 def _one_thread() -> AbstractContextManager[Any]:
     """Return a context in which a simulation makes the same bytes for any number of threads of BLAS."""
-    importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
+    importlib.import_module("scipy.linalg")  # its own BLAS can be limited once it is loaded
     return thread_limit(1)
 
 

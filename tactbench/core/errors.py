@@ -188,7 +188,7 @@ class DataError(TactbenchError, ValueError):
 
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
-    """The cell does not apply: its row says ``skipped`` and this reason."""
+    """The cell does not apply: its row is ``skipped`` with this reason."""
 
 
 class EngineError(TactbenchError):

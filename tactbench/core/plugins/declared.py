@@ -1,4 +1,4 @@
-"""Tasks that recordings bring with them, beside the installed ones."""
+"""Tasks that are declared beside recordings, in addition to the installed ones."""
 
 from __future__ import annotations
 

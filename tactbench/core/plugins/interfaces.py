@@ -227,7 +227,7 @@ class CostStudy(NamedTuple):
 
 
 class ReplayRig(Protocol):
-    """A rig whose scenes were carried out elsewhere, and which has their recordings."""
+    """A rig with recordings of scenes that were carried out elsewhere."""
 
     def recordings(self) -> Sequence[Path]:
         """Return the files, in a fixed order; raises MissingRecordingError if there are none."""
@@ -311,7 +311,7 @@ class EffectRun(Protocol):
         """Return the generator for draws that the recordings of a session share."""
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator for draws of this recording alone."""
+        """Return the generator for draws of this recording only."""
 
 
 class Estimator(Protocol):

@@ -1,4 +1,4 @@
-"""The registry of plugins: each is loaded alone, and every failure is kept as a row.
+"""The registry of plugins: each is loaded separately, and every failure is kept as a row.
 
 A plugin that fails on import stops no other; a name that two plugins give is refused, naming both distributions; a
 misspelt hook is an error. Plugins of other distributions are imported in child processes, which return data: whatever
@@ -62,14 +62,14 @@ class PluginRow:
 
 @dataclass(frozen=True)
 class Owned(Generic[D]):
-    """A descriptor, and the plugin that brings it."""
+    """A descriptor, and the plugin that defines it."""
 
     descriptor: D
     module: str
     distribution: str
     version: str
     declared: str = ""
-    """Declaration of a task that came with recordings, as JSON; empty: a plugin brings it."""
+    """Declaration of a task that came with recordings, as JSON; empty: a plugin defines it."""
 
     @property
     def ours(self) -> bool:
@@ -291,7 +291,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 
 
 def _mappings_beside(module: ModuleType) -> bool:
-    """Return whether a package brings mappings of data sets: see tactbench.core.recording.datasets."""
+    """Return whether a package has mappings of data sets: see tactbench.core.recording.datasets."""
     return any(any(Path(folder).glob("datasets/*.yaml")) for folder in getattr(module, "__path__", ()))
 
 
@@ -307,12 +307,12 @@ def _stated_version(module: str) -> object:
 
 def _check_api_version(module: str, written_for: object) -> None:
     """Raise PluginContractError if a plugin states another version of the interface than this one."""
-    spoken = hookspecs.API_VERSION
-    if written_for == spoken:
+    here = hookspecs.API_VERSION
+    if written_for == here:
         return
     raise PluginContractError(
-        f"{module} states TACTBENCH_API = {written_for!r}; the plugin interface here is {spoken}.",
-        hint=f"Write TACTBENCH_API = {spoken} in it, or update the older of the two: see docs/stability.md.",
+        f"{module} states TACTBENCH_API = {written_for!r}; the plugin interface here is {here}.",
+        hint=f"Write TACTBENCH_API = {here} in it, or update the older of the two: see docs/stability.md.",
     )
 
 

@@ -59,7 +59,7 @@ class DeclaredTask(Frozen):
     @model_validator(mode="after")
     def _makes_a_task(self) -> DeclaredTask:
         if self.answer is not None and not isinstance(self.target, LabelTarget):
-            raise ValueError("answer says how a label is read; a channel is a number")
+            raise ValueError("answer: class or number is for labels; a channel is a number")
         if self.metric is not None and self.metric not in _METRICS[self._answer]:
             raise ValueError(f"a {self._answer} is scored by {', '.join(_METRICS[self._answer])}, not by {self.metric}")
         try:

@@ -89,7 +89,7 @@ class MatrixSpec(Frozen):
     memory_mb: int | None = Field(default=None, ge=1, le=MOST_MEMORY_MB)
     """Most memory that a cell or a recording may take beyond what all share [MB of 2**20 bytes]."""
     probe: bool = False
-    """Whether cells are run that show what recordings give away; see docs/real-recordings.md."""
+    """Whether cells are run that show leaks of recordings; see docs/real-recordings.md."""
     latency: bool = True
     """Whether the time of answering one row is measured, which takes up to 0.3 s a cell."""
     include_incomplete: bool = False

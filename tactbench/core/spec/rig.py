@@ -1,4 +1,4 @@
-"""Descriptors of what a plugin brings. They name the place of its code, so that a listing imports none of it."""
+"""Descriptors of sensors, rigs and tasks with the places of their code, which a listing does not import."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class DeviceDescriptor(_Emulated, _Named):
 
 
 class TaskDescriptor(Frozen):
-    """A task, which is described by its spec alone."""
+    """A task, which its spec describes completely."""
 
     spec: TaskSpec
 

@@ -64,7 +64,7 @@ class Indenter(Frozen):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the stored form: of caps and flat surfaces their radius alone, as in earlier recordings."""
+        """Return the stored form: caps and flat surfaces have a radius only, as in earlier recordings."""
         stored: dict[str, Any] = serialize(self)
         return stored if self.shape is not None else {"radius": stored["radius"]}
 

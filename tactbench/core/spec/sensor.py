@@ -282,7 +282,7 @@ class SensorSpec(Frozen):
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
 
     def sites(self, *kinds: ChannelKind) -> tuple[tuple[ChannelSpec, ...], ...]:
-        """Return the channels of the given kinds by place: those of a site together, each other one alone."""
+        """Return the channels of the given kinds by place: those of a site together, every other one separately."""
         found: dict[tuple[str | None, str], list[ChannelSpec]] = {}
         for one in self.channels(*kinds):
             found.setdefault((one.site, "" if one.site else one.name), []).append(one)

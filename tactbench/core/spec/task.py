@@ -159,7 +159,7 @@ class Summary(Frozen):
 
 
 class TaskSpec(Frozen):
-    """A task, described by data alone; the core carries it out."""
+    """A task as data, which the core carries out."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
     title: str
