@@ -29,7 +29,7 @@ RIG_FILES = {
     "Settings of parallel-manipulator": (f"{_MANIPULATOR}.settings", f"{_MANIPULATOR}.kinematics"),
 }
 """Chapters of ``rig-files.md`` and the modules whose models they describe."""
-_MODELS = {"Frozen", "DeviceEntry", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}
+_MODELS = {"Frozen", "DeviceEntry", "NamedDevice", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}
 """Bases of the models of a rig file."""
 _RIG_FILES_TITLE = """# Rig files
 
@@ -69,8 +69,11 @@ def _door(door: str) -> Iterator[str]:
     for module in sorted(set(came_from.values())):
         source = _parsed(module)
         yield f"### {_markdown((ast.get_docstring(source) or '').partition(chr(10))[0]).rstrip('.')}\n"
+        classes = {node.name: node for node in source.body if isinstance(node, ast.ClassDef)}
         for node, after in _statements(source.body):
             if came_from.get(_target(node)) == module:
+                for base in (classes.get(one) for one in _bases(node) if one.startswith("_")):
+                    node.body += [] if base is None else base.body
                 yield f"#### `{_target(node)}`\n\n{_described(node, after)}\n"
 
 
@@ -104,7 +107,7 @@ def _described(node: ast.AST, after: ast.AST | None) -> str:
     if isinstance(node, ast.FunctionDef):
         return f"`{_signature(node)}`\n\n{_markdown(ast.get_docstring(node))}"
     if isinstance(node, ast.ClassDef):
-        bases = [base for base in _bases(node) if base != "Frozen"]
+        bases = [base for base in _bases(node) if base != "Frozen" and not base.startswith("_")]
         kind = f"A kind of {', '.join(f'`{base}`' for base in bases)}. " if bases else ""
         members = "\n".join(_members(node))
         return f"{kind}{_markdown(ast.get_docstring(node))}" + (f"\n\n{members}" if members else "")
@@ -140,8 +143,8 @@ def _field(member: ast.AnnAssign) -> str:
     return f"{_target(member)}: {ast.unparse(member.annotation)}{_default(member.value)}"
 
 
-def _bases(node: ast.ClassDef) -> list[str]:
-    return [ast.unparse(base) for base in node.bases]
+def _bases(node: ast.AST) -> list[str]:
+    return [ast.unparse(base) for base in getattr(node, "bases", ())]
 
 
 def _line(code: str, text: str | None) -> str:

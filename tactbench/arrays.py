@@ -1,4 +1,4 @@
-"""Recordings of arrays in memory: what ``tactbench.from_arrays`` gives."""
+"""Recordings of arrays in memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def from_arrays(
     unit: str | None = None,
     simulated: bool = True,
 ) -> list[Recording]:
-    """Return arrays as recordings, checked as imported ones are; in files that last as long as this process.
+    """Return arrays as recordings, which are checked as imported ones; their files last as long as this process.
 
     Parameters
     ----------
@@ -45,24 +45,24 @@ def from_arrays(
         (n,) numbers, (n, d) vectors, or (n,) classes: texts, truth values, or numbers of an integer type. NaN is no
         answer. Of a DataFrame the name of a column, or a list of names; `time_s` and `groups` alike.
     time_s
-        (n,) seconds, rising within each group; None: there is no clock.
+        (n,) times, rising within each group [s]; None: there is no clock.
     groups
         (n,) the session of each row, each a recording; None: all rows are one.
     sensor
         A name: lower case, digits, - and _.
     task
-        What `y` answers: the name of an installed task, or a new name.
+        Name of an installed task whose target `y` is, or a new name.
     unit
-        Of `y`; None: the task's, or 1.
+        Unit of `y`; None: the task's, or 1.
     simulated
-        Whether rows are marked SIM and ranked with no measured ones; False where a real sensor was read.
+        Whether rows are marked SIM and not ranked against measured ones; False where a real sensor was read.
 
     Raises
     ------
     UsageError
         If an argument cannot be used.
     MappingError
-        If a channel has no sample, or the arrays are otherwise none that could be imported.
+        If a channel has no sample, or the arrays could not be imported otherwise.
     """
     given: Any
     frame: Any = X if hasattr(X, "columns") else None
@@ -147,7 +147,7 @@ def _channel(place: int, name: str, kind: str, unit: str) -> dict[str, Any]:
 
 
 def _target(answers: npt.NDArray[Any], unit: str | None) -> ChannelTarget | VectorTarget | LabelTarget:
-    """Return what a new task asks: a class where answers are no numbers on a continuous scale."""
+    """Return the target of a new task: a label unless answers are floats or vectors."""
     if answers.ndim == 1 and answers.dtype.kind != "f":
         return LabelTarget(name="y")
     kind: Any = "force" if unit in ("N", "mN", "kN") else "other"
@@ -158,7 +158,7 @@ def _target(answers: npt.NDArray[Any], unit: str | None) -> ChannelTarget | Vect
 
 
 def _texts(answers: npt.NDArray[Any]) -> list[str]:
-    """Return classes as texts that are in the order of the values; no text for NaN and None."""
+    """Return classes as texts in the order of their values; NaN and None are empty."""
     if answers.dtype.kind in "iu":
         return [f"{one:0{len(str(answers.max()))}d}" for one in answers]
     return ["" if one is None or one != one else str(one) for one in answers.tolist()]

@@ -1,7 +1,4 @@
-"""What ``import tactbench`` gives beside recordings: tasks, scores and results in Python.
-
-The command line goes through the same functions, and :func:`evaluate` computes the row that a cell of a run has.
-"""
+"""Tasks, scores and results in Python; :func:`evaluate` computes the row that a cell of a run has."""
 
 from __future__ import annotations
 
@@ -47,7 +44,18 @@ from tactbench.core.tables.terminal import plain_text
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
-from tactbench.scoring import Estimators, Work, answered, cells_of, ended, name_of, named, question, side_by_side
+from tactbench.scoring import (
+    Estimators,
+    Options,
+    Work,
+    answered,
+    cells_of,
+    ended,
+    name_of,
+    named,
+    question,
+    side_by_side,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -67,7 +75,7 @@ def load_task(
     step: int = 1,
     seed: int = 1,
 ) -> TaskData:
-    """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
+    """Return a task on recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
 
     Parameters
     ----------
@@ -76,40 +84,41 @@ def load_task(
     recordings
         Those of :func:`open_recordings`, files, folders or globs.
     protocol
-        How recordings become rows; see docs/protocols.md.
+        Name of the protocol that makes rows of recordings; see docs/protocols.md.
     split
-        What training and test keep apart, by name; an object with scikit-learn's ``split(X, y, groups)``; or pairs of
-        index arrays (train, test) over the rows of `X`. None: the task's first that the recordings can serve.
+        Name of a split; an object with scikit-learn's ``split(X, y, groups)``; or pairs of index arrays (train, test)
+        over the rows of `X`. None: the task's first that the recordings can serve.
     groups
-        What a splitter keeps apart, and what intervals are then over: the name of a label of the recordings (session,
-        object …), or an array (n,). None: there is no interval.
+        Groups for a splitter and for intervals: the name of a label of the recordings (session, object …), or an array
+        (n,). None: there is no interval.
     window, step
         Rows of a window, and from its end to that of the next (1). `X` is then (n, window, features): each window lies
         in one recording and in one fold, and has the label of its last row. Training windows that share a row with a
         test window are in no fold.
     seed
-        Of split ``shuffled``.
+        Seed of split ``shuffled``.
 
     Returns
     -------
     TaskData
         `X` (n, features), `y` (n,) or (n, components), `groups` (n,), `feature_names`, and `folds`, index arrays that
         scikit-learn takes as `cv`. `X` is not scaled, and no row is dropped for its value: :func:`evaluate` does that
-        on each fold's training rows, as the protocol has it. Classes in `y` are indices into ``data.classes``.
+        on each fold's training rows. Classes in `y` are indices into ``data.classes``.
 
     Raises
     ------
     UsageError
         If an argument cannot be used, or these recordings cannot be split so.
     DataError
-        If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
+        If nothing is left to evaluate; its kind NotApplicable if these recordings do not have what the task needs.
     """
-    spec, _, paths, how = question(task, recordings, protocol, split, groups, window, step, seed)
+    options = Options(protocol, split, groups, window=window, step=step, seed=seed)
+    spec, _, paths, how = question(task, recordings, options)
     return folds_of(spec, read_dataset(spec, paths), protocol, **how)
 
 
 class Rows(list[dict[str, Any]]):
-    """Rows as mappings, shown as the `tables` that a terminal shows."""
+    """Rows as mappings, whose text is that of `tables`."""
 
     def __init__(self, rows: Iterable[dict[str, Any]], tables: Sequence[TextTable]) -> None:
         super().__init__(rows)
@@ -139,16 +148,8 @@ class Results(Rows):
         super().__init__(rows, [*grids(table), *table.sections])
         self.table = table
 
-    def __getitem__(self, place: Any) -> Any:
-        """Return a row; of a slice the table with these rows, in their blocks; places stay those among all."""
-        if not isinstance(place, slice):
-            return super().__getitem__(place)
-        lines = self.table.lines[place]
-        found = [replace(one, lines=tuple(line for line in one.lines if line in lines)) for one in self.table.blocks]
-        return Results(replace(self.table, blocks=tuple(block for block in found if block.lines)))
-
     def best(self, count: int = 1) -> Results:
-        """Return the first `count` answers of each sensor to each question; places stay those among all."""
+        """Return the first `count` rows of each sensor and question, with their places among all."""
         return Results(best(self.table, count))
 
     def compare(self, a: str, b: str, task: str | None = None) -> Rows:
@@ -174,16 +175,16 @@ class Result(Results):
     Attributes
     ----------
     score
-        The metric over the test rows of all folds together.
+        Metric over the test rows of all folds together.
     interval
-        Its ends over what the split holds out, the upper one infinite where it is open; None of fewer than five, whose
-        own scores are ``row["replicate_scores"]``. ``row["ci_method"]`` says over what.
+        Ends of its interval over the units that the split holds out (``row["ci_method"]``), the upper one infinite
+        where it is open; None of fewer than five units, whose own scores are ``row["replicate_scores"]``.
     trivial
-        Scores of the task's trivial answers by name; None of one that could not answer.
+        Scores of the task's trivial answers by name; None of one that failed.
     fold_scores
-        By name of the fold, in the order of ``load_task(...).folds``.
+        Scores by name of the fold, in the order of ``load_task(...).folds``.
     row
-        All that the table knows of the estimator: metric, unit, times, remarks …
+        The estimator's row: metric, unit, times, remarks …
     answers
         Truth and predictions of the test rows as arrays; classes are indices.
     """
@@ -193,7 +194,7 @@ class Result(Results):
     ) -> None:
         rows = over_replicates(rows)
         super().__init__(build_table(rows, questions={task.name: task.question}))
-        row, *others = map(against_reference, rows)  # what scikit-learn scores of `load_task`'s rows
+        row, *others = map(against_reference, rows)  # as scikit-learn scores the rows of `load_task`
         self.score: float = row["score"]
         self.interval: tuple[float, float] | None = None
         if row["ci_low"] is not None:
@@ -218,8 +219,8 @@ class Result(Results):
     def predictions(self) -> pandas.DataFrame:
         """Return a pandas DataFrame, a line a test row; raises UsageError if pandas is not installed.
 
-        recording, row (its place in the recording), time_s, fold (its name), y_true and y_pred: class labels, numbers,
-        or a column for each component of a vector.
+        Its columns are recording, row (place in the recording), time_s, fold (name), y_true and y_pred: class labels,
+        numbers, or a column for each component of a vector.
         """
         one, labels = self.answers, np.asarray(self.row["classes"])
         found = {"recording": np.asarray(self._names)[one.recording]}
@@ -233,12 +234,9 @@ class Result(Results):
         return frame
 
     def plot(self) -> Figure:
-        """Draw answers over the truth, a panel a component, or how often each class is taken for which.
+        """Return a figure of answers over the truth, a panel a component, or a confusion matrix of classes.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Notebooks show it. NotApplicable is raised for events: their figure is that of ``tactbench report``.
+        Raises NotApplicable for events, whose figure is that of ``tactbench report``.
         """
         from matplotlib.figure import Figure
         from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
@@ -282,33 +280,31 @@ def evaluate(
     ----------
     estimator
         Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, of which each fold fits a copy, or the name of
-        an installed one. Its class may be defined in a notebook. Classes in `y` are indices.
+        an installed one. Classes in `y` are indices.
     task, recordings, protocol, split, groups, window, step
         As of :func:`load_task`.
     metric
-        Name of a metric of docs/protocols.md or of one of scikit-learn's scorers, such a scorer, or a function of (y,
-        prediction). None: the task's. A scorer whose sign is negative is an error: the score is without that sign.
+        Name of a metric of docs/protocols.md or of a scorer of scikit-learn, such a scorer, or a function of (y,
+        prediction). None: the task's. The score of a scorer of an error is without its negative sign.
     greater_is_better
-        Whether a higher score is better: of a function, which does not say it itself.
+        Whether a higher score of a function is better.
     params
-        What ``fit`` takes beside `X` and `y`, as of ``sklearn.model_selection.cross_validate``: arrays (n,) of a value
-        for each row of ``load_task(...).X`` are cut to the rows of a fold. ``groups`` may be the name of a label. A
-        search of parameters by cross-validation is given the groups that the split keeps apart.
+        Further arguments of ``fit``, as of ``sklearn.model_selection.cross_validate``: arrays (n,) of a value for each
+        row of ``load_task(...).X`` are cut to the rows of a fold. ``groups`` may be the name of a label. A search of
+        parameters by cross-validation is given the split's groups.
     seed
-        Decides resamples of intervals, split ``shuffled``, and what is drawn from the global generators of ``random``
-        and numpy, whose states are afterwards as they were.
+        Seed of intervals, of split ``shuffled``, and of the global generators of ``random`` and numpy, whose states are
+        restored afterwards.
 
     Raises
     ------
     UsageError, DataError
         As of :func:`load_task`.
     PluginContractError
-        If the estimator answers with something else than a finite number, or a class, a row.
+        If a prediction is not finite, or no class.
     """
-    mine, *trivial = cells_of(
-        name_of(estimator), estimator, task, recordings, protocol, split, groups=groups, metric=metric,
-        greater_is_better=greater_is_better, params=params, window=window, step=step, seed=seed,
-    )  # fmt: skip
+    options = Options(protocol, split, groups, metric, greater_is_better, params, window, step, seed)
+    mine, *trivial = cells_of(name_of(estimator), estimator, task, recordings, options)
     data = read_dataset(mine.task, mine.paths)
     row, answers = answered(mine)
     rows = [row, *(ended(one, row["simulated"])[0] for one in trivial)]
@@ -329,34 +325,34 @@ def run(
     tasks: str | TaskSpec | Sequence[str | TaskSpec] | Mapping[str, Any] = (),
     **options: Any,
 ) -> Results:
-    """Acquire, evaluate and rank, as ``tactbench run`` does; or score estimators on data sets side by side.
+    """Acquire, evaluate and rank, as ``tactbench run`` does; or score estimators on several data sets.
 
     Parameters
     ----------
     sensor, task
         Names, one or several.
     estimator
-        Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Where there
-        are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
+        Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Beside
+        objects, only the tasks' trivial answers are run.
     recordings, out
         Folder of recordings to replay, or all recordings of one; the result folder.
     data, estimators, tasks
-        Several data sets: recordings by name, objects and names of estimators as of `estimator`, and one task or
-        several. Each data set has tables of its own, of all its sensors, and its result folder in `out`.
+        Recordings of several data sets by name, estimators as of `estimator`, and one task or several. Each data set
+        has its own tables, and a result folder in `out`.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
         ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated. With
-        `data` the arguments of :func:`evaluate` and `jobs`, processes at once (None: all cores). Each of these, and
-        `tasks`, may be a mapping from names of data sets or of estimators: ``split={"pad": GroupKFold(3)}``.
+        `data`: the arguments of :func:`evaluate`, and `jobs`, the number of processes (None: all cores). Each of these,
+        and `tasks`, may be a mapping from names of data sets or of estimators: ``split={"pad": GroupKFold(3)}``.
 
     Notes
     -----
-    What has a name is evaluated in processes of its own, as by the verb, and stored in `out`. Objects are evaluated
-    afterwards in this process, on the recordings of the other rows, and their rows are in the returned table alone: a
-    later run knows nothing of them. An option or a name that is wrong raises UsageError, and nothing is run.
+    Named estimators are evaluated in child processes, as by the verb, and stored in `out`. Objects are evaluated
+    afterwards in this process, on the recordings of the other rows, and are in the returned table only. An option or a
+    name that is not valid raises UsageError before anything is run.
 
-    With `data` everything is evaluated by joblib, without times of single answers where `jobs` is not 1. What ended is
-    found again while object, metric, data and code are the same, where that can be told: see `remarks` of a row.
+    With `data` joblib evaluates everything; single answers are timed with ``jobs=1`` only. Rows are reused while
+    object, metric, data and code are the same; `remarks` of a row state where that cannot be checked.
     """
     if data is not None:
         given = {"sensor": sensor, "task": task, "estimator": estimator, "recordings": recordings}
@@ -364,27 +360,21 @@ def run(
             raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = named(estimator)
-    asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
-    if unknown := asked.keys() - Study.model_fields:
+    given = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
+    if unknown := given.keys() - Study.model_fields:
         raise UnknownNameError("argument of `run`", min(unknown), Study.model_fields)
     try:
-        study = Study(estimator=names if names or objects else None, **asked)
+        study = Study(estimator=names if names or objects else None, **given)
     except ValidationError as error:
         raise UsageError(f"{complaint(error)}.", hint="See the options in `tactbench run --help`.") from error
     store, outcome = carry_out(study)
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table, store.folder)
-    # Of the rows of a question a finished one counts, else a trivial answer's, whose reason is that of the recordings.
+    # The row of a question is a finished one, else a trivial answer's, whose reason is that of the recordings.
     ended = sorted(outcome.rows, key=lambda row: (row["status"] == "done", row["is_baseline"]))
     each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
-
-
-_OPTIONS = (
-    "protocol", "split", "groups", "metric", "greater_is_better", "params", "window", "step", "seed",
-)  # fmt: skip
-"""Arguments of :func:`evaluate` that data sets or estimators may have each their own of."""
 
 
 def _over_data(
@@ -404,14 +394,14 @@ def _over_data(
         raise wrong("estimators", estimators, "objects and names of estimators, at least one")
     if jobs is not None and not (isinstance(jobs, int) and jobs > 0):
         raise wrong("jobs", jobs, "a whole number, 1 or more")
-    if unknown := options.keys() - set(_OPTIONS):
-        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *_OPTIONS))
+    if unknown := options.keys() - set(Options._fields):
+        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *Options._fields))
 
     def chosen(value: Any, *of: str) -> Any:
         mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
         return next((value[name] for name in of if name in value), None) if mapped else value
 
-    asked: dict[str, dict[str, Work]] = {name: {} for name in data}
+    work_of: dict[str, dict[str, Work]] = {name: {} for name in data}
     splits: dict[tuple[Any, ...], OwnSplit] = {}
     for name, recordings in data.items():
         some = chosen(tasks, name)
@@ -422,7 +412,7 @@ def _over_data(
             for called, given in every.items():
                 own = {key: chosen(value, called, name) for key, value in options.items()}
                 stated = {key: value for key, value in own.items() if value is not None}
-                for work in cells_of(called, given, task, mine, **stated):
+                for work in cells_of(called, given, task, mine, Options(**stated)):
                     if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
                         of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
                         if of not in splits:
@@ -430,9 +420,9 @@ def _over_data(
                             folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
                             folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
                         work.how["split"] = splits[of]
-                    asked[name].setdefault(work.cell.name, work)
+                    work_of[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
-    for name, rows in side_by_side(asked, out, jobs or usable_cores()).items():
+    for name, rows in side_by_side(work_of, out, jobs or usable_cores()).items():
         store = Store(out / name)
         table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
         write_tables(table, store.folder)
@@ -441,13 +431,13 @@ def _over_data(
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
-    """Return the rows of a result folder, what ``tactbench leaderboard FOLDER`` shows; UsageError if there are none."""
+    """Return the rows of a result folder, as ``tactbench leaderboard`` shows them; raises UsageError if it has none."""
     store = opened(Path(folder))
     return Results(table_of(store, shown_rows(store)))
 
 
 def _folder(recordings: Recordings | None) -> AnyPath | None:
-    """Return the folder that a run replays; raises UsageError for recordings that are not all of one folder."""
+    """Return the folder that a run replays; raises UsageError unless the recordings are all of one folder."""
     if recordings is None or isinstance(recordings, str | os.PathLike):
         return recordings
     paths = {one.path for one in open_recordings(recordings)}
@@ -461,11 +451,11 @@ def _folder(recordings: Recordings | None) -> AnyPath | None:
 
 
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
-    """Return the row of an object that answers what another row answered, from the same recordings."""
+    """Return the row of an object for the question and the recordings of another row."""
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
     task = with_declared_of(installed(), [row]).tasks[cell.task].spec
     paths = [folder / named_file(one) for one in row["recordings"]]
-    if not paths:  # no answer to this question was finished
+    if not paths:  # no cell of this question has finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
     return ended(Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]

@@ -1,7 +1,4 @@
-"""Cells of estimators that are objects: what is asked, by what arguments, and the row that each comes to.
-
-What a cell of a run names, a caller in Python may give: estimator, split, metric, parameters of ``fit``, windows.
-"""
+"""Cells whose estimator, split, metric, parameters of ``fit`` and windows are given as objects in Python."""
 
 from __future__ import annotations
 
@@ -34,8 +31,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.spec.declared_task import FILE
-from tactbench.core.spec.row import DIRECTIONS
-from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.row import DIRECTIONS, STOPPED
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.study.progress import progress
 from tactbench.recordings import Recordings, opened_as
@@ -43,14 +39,28 @@ from tactbench.recordings import Recordings, opened_as
 Row = dict[str, Any]
 
 
-def question(
-    task: str | TaskSpec, recordings: Recordings, protocol: str, split: Any, groups: Any, window: int | None, step: int,
-    seed: int,
-) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:  # fmt: skip
-    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), the files, and how.
+class Options(NamedTuple):
+    """Arguments of :func:`tactbench.evaluate` that may differ by data set or estimator."""
 
-    The last has what :func:`folds_of` takes.
+    protocol: str = "deployable"
+    split: Any = None
+    groups: Any = None
+    metric: Any = None
+    greater_is_better: bool | None = None
+    params: Mapping[str, Any] | None = None
+    window: int | None = None
+    step: int = 1
+    seed: int = 1
+
+
+def question(
+    task: str | TaskSpec, recordings: Recordings, options: Options
+) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:
+    """Return the task, the JSON that declares it beside the recordings, the files, and the arguments of its folds.
+
+    The JSON is empty for an installed task; the last are those of :func:`tactbench.core.evaluation.folds.load_task`.
     """
+    protocol, split, groups, *_, window, step, seed = options
     for name, given, least in (("window", 1 if window is None else window, 1), ("step", step, 1), ("seed", seed, 0)):
         if not isinstance(given, int | np.integer) or given < least or (name == "step" and given > 1 and not window):
             raise wrong(name, given, f"a whole number, {least} or more{', beside `window`' * (name == 'step')}")
@@ -71,50 +81,37 @@ def question(
             raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
         split = OwnSplit(split, groups)
     elif groups is not None:
-        raise wrong("groups", groups, "what a splitter keeps apart, and `split` is none (`params` has those of `fit`)")
+        raise wrong("groups", groups, "groups for a splitter in `split` (`params` has those of `fit`)")
     return task, declared, paths, {"split": split, "window": window or 0, "step": step, "seed": seed}
 
 
 class Work(NamedTuple):
-    """A cell that is evaluated here, with all names looked up."""
+    """A cell that is evaluated in this process, with its task and files."""
 
     cell: Cell
     task: TaskSpec
     paths: tuple[Path, ...]
     how: dict[str, Any]
-    """what the caller gives in place of what is named, as of :func:`solve`"""
+    """the caller's objects, as :func:`solve` takes them"""
 
 
 def cells_of(
-    name: str,
-    estimator: str | Estimator,
-    task: str | TaskSpec,
-    recordings: Recordings,
-    protocol: str = "deployable",
-    split: Any = None,
-    *,
-    groups: Any = None,
-    metric: Any = None,
-    greater_is_better: bool | None = None,
-    params: Mapping[str, Any] | None = None,
-    window: int | None = None,
-    step: int = 1,
-    seed: int = 1,
+    name: str, estimator: str | Estimator, task: str | TaskSpec, recordings: Recordings, options: Options
 ) -> list[Work]:
-    """Return the cell of an estimator, and those of the task's trivial answers; arguments as of :func:`evaluate`."""
-    spec, declared, paths, how = question(task, recordings, protocol, split, groups, window, step, seed)
-    given = None if isinstance(estimator, str) else estimator
-    scored = metric_of(metric, greater_is_better, spec)
-    if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
+    """Return the cell of an estimator, and those of the task's trivial answers."""
+    spec, declared, paths, how = question(task, recordings, options)
+    given, params = None if isinstance(estimator, str) else estimator, options.params
+    scored = metric_of(options.metric, options.greater_is_better, spec)
+    if scored.name != spec.metric:  # published figures and equivalence are those of the task's own metric
         unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
         spec = spec.model_copy(update={"metric": scored.name, "unit": unit, "equivalence": None, "published": ()})
     if params is not None and (given is None or not isinstance(params, Mapping)):
-        raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
-    if window and given is None:
+        raise wrong("params", params, "a mapping of arguments of `fit` of an object to their values")
+    if options.window and given is None:
         raise wrong("estimator", estimator, "an object where `window` is given")
     cell = Cell(
-        sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
-        split=getattr(how["split"], "name", split), estimator=name, params=(), baseline=False, seed=seed,
+        sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=options.protocol,
+        split=getattr(how["split"], "name", how["split"]), estimator=name, params=(), baseline=False, seed=options.seed,
         declared_task=declared,
     )  # fmt: skip
     how |= {"given": None, "metric": scored}
@@ -124,7 +121,7 @@ def cells_of(
 
 
 def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
-    """Return a metric by name, of a scikit-learn scorer, or of a function of (y, prediction); None: the task's."""
+    """Return the metric of a name, a scikit-learn scorer, or a function of (y, prediction); of None the task's."""
     own, scorer = metric_called(task.metric), given
     found = own if given is None else None
     if isinstance(given, str):
@@ -134,10 +131,10 @@ def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Met
     alike = found is not None and (found.kind, found.vector) == (own.kind, own.vector)
     if not alike and (found is not None or own.kind == "events" or not by_prediction):
         takes = "a name of docs/protocols.md or of sklearn.metrics.get_scorer_names(), a scorer of predictions, or a "
-        raise wrong("metric", given, f"what scores a {own.kind}: {takes}function of (y, prediction)")
+        raise wrong("metric", given, f"a metric of {own.kind}: {takes}function of (y, prediction)")
     plain = not alike and not hasattr(scorer, "_score_func")
     if not (isinstance(greater_is_better, bool) if plain else greater_is_better is None):
-        takes = "True or False where `metric` is a function, and nothing where it tells the direction itself"
+        takes = "True or False where `metric` is a function, and no value otherwise"
         raise wrong("greater_is_better", greater_is_better, takes)
     if found is not None:
         return found
@@ -149,10 +146,10 @@ def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Met
 
 
 def name_of(estimator: str | Estimator) -> str:
-    """Return what an estimator is called in tables: the name of its class, of a pipeline those of its steps."""
+    """Return the name of an estimator in tables: that of its class, or of a pipeline those of its steps."""
     if isinstance(estimator, str):
         return estimator
-    # Some classes of scikit-learn have their `predict` after `fit` alone: then their class has it.
+    # Some objects of scikit-learn have no `predict` before `fit`, but their class has it.
     able = (hasattr(estimator, name) or hasattr(type(estimator), name) for name in ("fit", "predict"))
     if isinstance(estimator, type) or not all(able):
         raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
@@ -161,9 +158,9 @@ def name_of(estimator: str | Estimator) -> str:
 
 
 def answered(work: Work) -> Solved:
-    """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
+    """Return the row and the answers of a cell; the states of global random generators are restored afterwards."""
     described = installed().estimators[work.cell.estimator] if work.how["given"] is None else PLAIN
-    states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
+    states = random.getstate(), np.random.get_state()  # noqa: NPY002  (cells seed this old generator)
     try:
         return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.how)
     finally:
@@ -172,7 +169,7 @@ def answered(work: Work) -> Solved:
 
 
 def ended(work: Work, simulated: bool) -> Solved:
-    """Return the row of a cell that is evaluated here, whether it finishes or not, and its answers."""
+    """Return the row of a cell, whether it finishes or not, and its answers."""
     try:
         return answered(work)
     except Exception as error:
@@ -183,7 +180,7 @@ Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ..
 
 
 def named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
-    """Return names of installed estimators, and objects by what they are called."""
+    """Return the names of installed estimators, and the objects by name; raises UsageError for a repeated name."""
     if not isinstance(estimator, Mapping):
         several = list(estimator) if isinstance(estimator, list | tuple) else [estimator]
         pairs = [(name_of(one), one) for one in several]
@@ -199,14 +196,14 @@ def named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
     return names, objects
 
 
-def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
-    """Return the rows of cells of data sets, each found in a result folder or evaluated in one of `jobs` processes."""
+def side_by_side(work_of: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
+    """Return the rows of cells by data set, from its result folder or evaluated in one of `jobs` processes."""
     import joblib
 
-    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in asked}
+    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in work_of}
     todo: list[tuple[str, Work, Store, str, Sections, str]] = []
     with ExitStack() as held, progress() as display:
-        for name, works in asked.items():
+        for name, works in work_of.items():
             store = held.enter_context(Store(out / name).hold())
             store.begin(gather(installed(), engine="joblib"))
             each = {work.paths for work in works.values()}
@@ -217,7 +214,7 @@ def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) 
                     key, sections = keys.of_given(work.cell, work.task, work.how, digests[work.paths])
                     why = ""
                 except ValueError as error:
-                    key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
+                    key, sections, why = "", {}, f"computed anew at every run: its source is not known ({error})"
                 if (found := store.finished(key)) is None:
                     todo.append((name, work, store, key, sections, why))
                 else:
@@ -234,11 +231,11 @@ def side_by_side(asked: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) 
         except (BrokenProcessPool, PicklingError) as error:
             raise EngineError(
                 f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
-                hint="What has ended is kept. Give jobs=1 to evaluate the rest in this process.",
+                hint="Finished rows are kept. Give jobs=1 to evaluate the rest in this process.",
             ) from error
-    return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
+    return {name: [rows[name][cell] for cell in works] for name, works in work_of.items()}
 
 
 def _in_place(place: int, work: Work) -> tuple[int, Solved]:
-    """Return a cell's place among those that are computed, and what came of it."""
+    """Return a cell's place among those to compute, and its row and answers."""
     return place, ended(work, simulated=False)

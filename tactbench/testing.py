@@ -1,6 +1,6 @@
-"""What a plugin's author tests with: the checks of ``tactbench check``, for pytest.
+"""The checks of ``tactbench check`` for a plugin's own tests with pytest.
 
-The plugin must be installed (``pip install -e .``): it is found by its entry point, as a user finds it.
+The plugin must be installed (``pip install -e .``), as it is found by its entry point.
 ``tactbench check --list`` names the checks.
 
 >>> import pytest
@@ -40,7 +40,7 @@ class PluginCheck:
         return self.name
 
     def __call__(self) -> None:
-        """Raise CheckFailed if the plugin fails it; skip the test if it is about what the plugin lacks."""
+        """Raise CheckFailed if the plugin fails it; skip the test if it does not apply to the plugin."""
         import pytest
 
         check = self.name.partition("-")[2]
@@ -58,19 +58,14 @@ def _report(subject: Subject, recording: Path | None) -> CheckReport:
 
 
 def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginCheck]:
-    """Return the checks of what is called `name`, for ``pytest.mark.parametrize``.
+    """Return the checks of `name`, for ``pytest.mark.parametrize``; raises UnknownNameError.
 
     Parameters
     ----------
     name
-        Of a sensor, rig, device, task, estimator, effect, indenter or profile; or of a plugin: then of all it brings.
+        Name of a sensor, rig, device, task, estimator, effect, indenter or profile, or of a plugin with several.
     recording
-        Of a sensor: its checks against this recording as well.
-
-    Raises
-    ------
-    UnknownNameError
-        If nothing is called so.
+        A recording of the sensor, which its checks then cover.
     """
     return [
         PluginCheck(f"{subject.kind}-{one.name}", partial(_report, subject, recording))
@@ -80,5 +75,5 @@ def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginChe
 
 
 def check_plugin(name: str, *, recording: Path | None = None) -> list[CheckReport]:
-    """Run the checks of what is called `name`; raises as `plugin_checks`, and nothing for a failure."""
+    """Run the checks of `name` and return their outcomes; raises UnknownNameError."""
     return [_report(subject, recording) for subject in subjects_named(installed(), name)]

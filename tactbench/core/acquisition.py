@@ -31,26 +31,25 @@ def acquire(
     """Carry out a scene, write the samples to a file, and return the meta of the recording.
 
     A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
-    incomplete one: `excluded` begins with ``incomplete: `` and says why.
+    incomplete one: `excluded` is ``incomplete: `` and the reason.
 
     Parameters
     ----------
     rig
-        What `request.rig` describes. If its acquisition is one of devices (DeviceAcquisition), what it says
-        of its counts is recorded too. Where something moves in it by itself, it has ``stop(why)``, which is called
-        before an interrupted recording is completed: it ends that at once, and returns what is to be done where it
-        could not be ended, or an empty text.
+        The rig of `request.rig`. The counts of an acquisition of devices (DeviceAcquisition) are recorded too. An
+        acquisition with parts that move has ``stop(why)``, which is called before an interrupted recording is
+        completed: it stops them at once, and returns what remains to be done by hand, or an empty text.
     clock
-        Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
-        ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+        Monotonic clock [s]; its difference over the scene, without writing the file, is ``provenance["sim_s"]`` of a
+        simulated rig and ``provenance["acquisition_s"]`` of others.
     opened
         Called with the acquisition before its first block.
     watch
         Called with every block, once it is written.
     complete_interrupted
-        Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
-        error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
-        simulation nothing is left behind.
+        Whether an interrupted recording of a real rig is completed, excluded from every evaluation, before the error
+        goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. An
+        interrupted simulation leaves no file.
 
     Raises
     ------
@@ -78,7 +77,7 @@ def acquire(
         began_s = time.perf_counter()
 
         def conclude(why: str) -> None:
-            """Write the facts that are known at the end, with the reason `why` it is excluded, if it is."""
+            """Write the facts that are known at the end, with the reason for its exclusion, if there is one."""
             factor = whole.seconds / (time.perf_counter() - began_s)
             drawn = dict(acquisition.drawn)
             remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
@@ -114,7 +113,7 @@ def acquire(
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
                 if not simulated and any(writer.rows.values()):
-                    with suppress(RecordingError):  # a disk that refuses this: the journal stays with what came before
+                    with suppress(RecordingError):  # a full disk: the journal stays with the earlier rows
                         conclude(f"interrupted: {_why(error)}")
                         if complete_interrupted:
                             writer.complete()
@@ -147,18 +146,18 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
         if names and not any(rows.get(name) for name in names):
             raise RigError(
                 f"No row came from {', '.join(names)} in the whole scene.",
-                hint="Is the device on, connected and set to the same speed? `tactbench doctor` asks it.",
+                hint="Is the device on, connected and set to the same speed? `tactbench doctor` tests it.",
             )
 
 
 def _one_thread() -> AbstractContextManager[Any]:
     """Return a context in which a simulation makes the same bytes for any number of threads of BLAS."""
-    importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
+    importlib.import_module("scipy.linalg")  # its own BLAS can be limited once it is loaded
     return thread_limit(1)
 
 
 def _stopped(acquisition: Acquisition, error: BaseException) -> str:
-    """Stop what moves before anything is written; return what remains to be done by hand where that fails."""
+    """Stop all motion before anything is written; return what remains to be done by hand where that fails."""
     stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
     return "" if stop is None else stop(_why(error))
 
@@ -168,10 +167,9 @@ def _why(error: BaseException) -> str:
 
 
 def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
-    """Return counts with the written rows; rows on their way when the recording was cut short are dropped ones."""
-    left = counts.received - written - counts.dropped - counts.duplicates - counts.late
-    dropped = counts.dropped + max(0, left) if cut_short else counts.dropped
-    return counts.model_copy(update={"written": written, "dropped": dropped})
+    """Return counts with the written rows; rows in transit when the recording was cut short count as dropped."""
+    left = max(0, counts.received - written - counts.dropped - counts.duplicates - counts.late) if cut_short else 0
+    return counts.model_copy(update={"written": written, "dropped": counts.dropped + left})
 
 
 def _of_devices(
@@ -201,10 +199,7 @@ def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
 
 
 def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
-    """Return which devices are emulated, by the rig file and by their own facts; None: none is.
-
-    `factor` is how much faster than the clock it went.
-    """
+    """Return how devices were emulated, by the rig file and by their own facts; None: none was."""
     names = [] if file is None else [
         name
         for name, entry in file.entries().items()
@@ -213,12 +208,13 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
     ]  # fmt: skip
     if file is None or not names:
         return None
-    ours = Emulation(time="virtual" if file.emulated else "real", factor=factor, devices=tuple(names))
-    if file.emulated or file.emulation.control:
-        how = file.emulation
-        faults = [f"{name}: {fault}" for name in names for fault in file.entries()[name].faults]
-        ours = ours.model_copy(update={"seed": how.seed, "physics": how.physics, "faults": tuple(faults)})
-    return ours
+    how, known = file.emulation, {"factor": factor, "devices": tuple(names)}
+    if not (file.emulated or how.control):
+        return Emulation(time="real", **known)
+    faults = tuple(f"{name}: {fault}" for name in names for fault in file.entries()[name].faults)
+    return Emulation(
+        time="virtual" if file.emulated else "real", seed=how.seed, physics=how.physics, faults=faults, **known
+    )
 
 
 def _meta(acquisition: Acquisition, request: RecordingRequest) -> RecordingMeta:

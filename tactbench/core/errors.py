@@ -3,31 +3,14 @@
 ::
 
     TactbenchError
-    ├── UsageError                    a command or a call cannot be carried out: exit code 2
-    │   ├── UnknownNameError          no sensor, rig, task … of that name (carries the nearest names)
-    │   ├── ConfigError               a YAML file is not valid (carries file and line)
-    │   └── FolderError               a result folder refuses, is held by another run, or contradicts another
-    ├── PluginError                   a plugin cannot be used
-    │   ├── DuplicateNameError        two distributions give one name
-    │   └── PluginContractError       a plugin does not keep the interface it promised
-    ├── RecordingError                a recording cannot be read or written
-    │   ├── FormatError               (also ValueError) not a recording, or a damaged one
-    │   ├── MissingRecordingError     (also FileNotFoundError)
-    │   ├── UnwritableError           the place for it refuses: exit code 2
-    │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
-    ├── RigError                      a rig cannot carry out a scene
-    ├── LinkError                     a link to a device cannot be opened or used
-    │   ├── LinkClosed                it was closed
-    │   ├── LinkTimeout               nothing came, or nothing could be sent, within the time given
-    │   └── LinkUnplugged             the device, its cable or the other end is gone
-    ├── DataError                     (also ValueError) recordings cannot become X and y
-    │   └── NotApplicable             the cell is skipped, with this reason
-    ├── EngineError                   the engine that computes cells is gone, or has other versions
-    └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
-        ├── Raised                    an error of another package was raised in another process
-        ├── Crashed                   its process was ended by a signal, or ended itself
-        ├── TimedOut                  it took longer than it may
-        └── OutOfMemory               it took more memory than it may, or than there is
+    ├── UsageError: UnknownNameError, ConfigError, FolderError
+    ├── PluginError: DuplicateNameError, PluginContractError
+    ├── RecordingError: FormatError, MissingRecordingError, UnwritableError, MappingError
+    ├── RigError
+    ├── LinkError: LinkClosed, LinkTimeout, LinkUnplugged
+    ├── DataError: NotApplicable
+    ├── EngineError
+    └── CellStopped: Raised, Crashed, TimedOut, OutOfMemory
 
 Every message names what was given, what was expected and the next step.
 """
@@ -44,15 +27,7 @@ if TYPE_CHECKING:
 
 
 class TactbenchError(Exception):
-    """Root of all errors of tactbench.
-
-    Parameters
-    ----------
-    message
-        What was given and what was expected, in one sentence.
-    hint
-        The next step for the reader, in one sentence.
-    """
+    """Root of all errors of tactbench: a message of what was given and expected, and a hint at the next step."""
 
     exit_code = 1
     traceback_text = ""
@@ -79,12 +54,12 @@ def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchEr
 
 
 def error_text(error: BaseException) -> str:
-    """Return an error as text: its message, with the class where that is not one of tactbench's."""
+    """Return the message of an error, behind its class where that is not one of tactbench's."""
     return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 class UsageError(TactbenchError):
-    """A command or a call cannot be carried out as it is given."""
+    """A command or a call cannot be carried out as it is given: exit code 2."""
 
     exit_code = 2
 
@@ -98,13 +73,13 @@ def nearest(given: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """Return a question for the names of `known` that look like `given`, and a blank; empty if none does."""
+    """Return ``Did you mean …? `` for the names of `known` that look like `given`; empty if none does."""
     close = " or ".join(map(repr, nearest(given, known)))
     return f"Did you mean {close}? " if close else ""
 
 
 def complaint(error: ValidationError) -> str:
-    """Return the first complaint of pydantic: where, what is wrong there, and what was given."""
+    """Return the first complaint of pydantic as ``place: message (given: value)``."""
     first = error.errors(include_url=False)[0]
     place, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
@@ -112,14 +87,14 @@ def complaint(error: ValidationError) -> str:
 
 
 def wrong(argument: str, given: object, takes: str) -> UsageError:
-    """Return the error of a function in Python that was given something that its argument does not take."""
+    """Return the error of a function in Python for a value that its argument does not take."""
     shown = repr(given) if isinstance(given, str | type) else reprlib.repr(given)
     shown += f" of shape {given.shape}" if hasattr(given, "shape") else ""
     return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
 
 
 class UnknownNameError(UsageError):
-    """There is no sensor, rig, task … with a given name."""
+    """There is no sensor, rig, task … with a given name; the hint has the nearest names."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
@@ -128,7 +103,7 @@ class UnknownNameError(UsageError):
 
 
 class ConfigError(UsageError):
-    """A configuration file is not valid."""
+    """A YAML file is not valid; the message begins with file and line."""
 
     def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
         where = f"{file}:{line}" if line else file
@@ -177,7 +152,7 @@ class MissingRecordingError(RecordingError, FileNotFoundError):
 
 
 class UnwritableError(RecordingError):
-    """The folder or disk that a recording shall go to refuses it."""
+    """The folder or disk of a recording refuses it."""
 
     exit_code = 2
 
@@ -213,7 +188,7 @@ class DataError(TactbenchError, ValueError):
 
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
-    """The cell does not apply: its row says ``skipped`` and this reason."""
+    """The cell does not apply: its row is ``skipped`` with this reason."""
 
 
 class EngineError(TactbenchError):
@@ -225,21 +200,16 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
 
     Parameters
     ----------
-    message, hint
+    message, hint, traceback_text
         As of every error.
     signal
-        Number of the signal that ended its process, if one did.
+        Number of the signal that ended its process; None: no signal did.
     log
-        The end of what it had printed.
-    traceback_text
-        Where it was, as far as that is known.
-
-    Attributes
-    ----------
-    spent_s
-        Seconds until it ended; None: not known.
+        The end of its output.
     """
 
+    spent_s: float | None = None
+    """Time until it ended [s]; None: not known."""
     status: Literal["failed", "crashed", "timeout", "out-of-memory"] = "crashed"
 
     def __init__(
@@ -248,7 +218,6 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
         super().__init__(message, hint=hint)
         self.signal = signal
         self.log = log
-        self.spent_s: float | None = None
         self.traceback_text = traceback_text
 
 

@@ -1,4 +1,4 @@
-"""Writing of whole files, locks, and texts that are no UTF-8."""
+"""Writing of whole files, locks, and texts that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -24,12 +24,9 @@ def named_file(text: str) -> Path:
 
 
 def try_lock(file: int) -> bool | None:
-    """Lock an open file for this process (flock(2)); the lock ends when the file is closed or the process ends.
+    """Lock an open file for this process (flock(2)) until it is closed or the process ends.
 
-    Returns
-    -------
-    bool or None
-        False if another process has it; None where there are no locks: on Windows, on some network disks.
+    Return False if another process has the lock; None where there are no locks: on Windows, on some network disks.
     """
     try:
         import fcntl
@@ -43,15 +40,10 @@ def try_lock(file: int) -> bool | None:
 
 
 def hdf5_image(fill: Callable[[Any], None]) -> bytes:
-    """Return the bytes of an HDF5 file that is built in memory.
+    """Return the bytes of an HDF5 file that is built in memory by `fill`, which is called with the open ``h5py.File``.
 
     The HDF5 library cannot close a file on a full disk, and crashes the process when Python raises in a file object
-    that it writes through, as Ctrl-C does.
-
-    Parameters
-    ----------
-    fill
-        Writes into the open ``h5py.File``, which is of the oldest format that HDF5 still writes: every reader opens it.
+    that it writes through, as Ctrl-C does. The file has the oldest format of HDF5, which every reader opens.
     """
     import h5py
 
@@ -66,17 +58,7 @@ def hdf5_image(fill: Callable[[Any], None]) -> bytes:
 def replace_file(path: Path, content: bytes) -> None:
     """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
 
-    Parameters
-    ----------
-    path
-        The file.
-    content
-        What it is to hold.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written; nothing is left behind.
+    Raises OSError if the folder cannot be written; no partial file is left then.
     """
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:

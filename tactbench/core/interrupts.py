@@ -56,7 +56,7 @@ def _again(dropped: Any) -> None:
 def one_interrupt() -> Iterator[Callable[[], None]]:
     """Return a context in which the first signal raises KeyboardInterrupt and further ones are ignored.
 
-    Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
+    It yields a function that ignores all signals from then on. Other threads and own handlers are not affected.
     """
 
     def ignore() -> None:

@@ -9,10 +9,9 @@ from typing import Any
 
 
 def on_demand(door: str) -> Callable[[str], Any]:
-    """Return a ``__getattr__`` for module `door` that imports what the module imports under ``if TYPE_CHECKING``.
+    """Return a ``__getattr__`` for module `door` that imports, at first use, its names under ``if TYPE_CHECKING``.
 
-    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them, nor a command
-    that shows its help.
+    A listing of plugins, or a command that shows its help, then imports neither numpy nor links.
     """
 
     def imported(name: str) -> Any:

@@ -20,18 +20,8 @@ if TYPE_CHECKING:
     FloatArray = npt.NDArray[np.float64]
     """An array of float64 of any shape."""
     IntArray = npt.NDArray[np.int64]
-
-
-def __getattr__(name: str) -> Any:
-    """Import numpy for the aliases at their first use, as listings and cached runs need none."""
-    if name not in ("FloatArray", "IntArray"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import numpy as np
-    import numpy.typing as npt
-
-    found = {"FloatArray": npt.NDArray[np.float64], "IntArray": npt.NDArray[np.int64]}
-    globals().update(found)
-    return found[name]
+else:
+    FloatArray = IntArray = Any  # listings and cached runs import no numpy
 
 
 class Quality(IntFlag):
@@ -54,8 +44,7 @@ class Block:
 
     stream: str
     t_ns: IntArray | None
-    """Times, (n,) nanoseconds; None when there is no clock. Of a device with a clock of its own, the times at which the
-    host had the samples."""
+    """Times, (n,) nanoseconds: of a device with a clock of its own, when the host had the samples; None: no clock."""
     data: npt.NDArray[Any]
     """Samples, (n, channels), in the units of the stream's channels."""
     quality: npt.NDArray[np.uint8] | None = None
@@ -63,8 +52,8 @@ class Block:
     sequence: IntArray | None = None
     """The device's own number of each sample, (n,), counted on over its wraps; None: it has none."""
     device_ns: IntArray | None = None
-    """Times of the device's own clock, (n,) nanoseconds, counted on over its wraps; None: it has none. Where the count
-    is lost, it begins again with a lower number."""
+    """Times of the device's own clock, (n,) nanoseconds, counted on over its wraps; None: it has none. They go back
+    where the count is lost."""
 
     def rows(self, which: slice | npt.NDArray[np.bool_]) -> Block:
         """Return the rows of a slice or a mask."""
@@ -132,10 +121,7 @@ class SkinGrid:
     @property
     def cell_mm(self) -> tuple[float, float]:
         """Spacing of the centres in x and s."""
-        return (
-            float(self.x_mm[1] - self.x_mm[0]),
-            float(self.s_mm[1] - self.s_mm[0]),
-        )
+        return float(self.x_mm[1] - self.x_mm[0]), float(self.s_mm[1] - self.s_mm[0])
 
 
 @dataclass(frozen=True)
@@ -159,13 +145,12 @@ class SkinState:
     residual: float
     """Relative residual of the solver."""
     tangential_displacement_mm: FloatArray | None = None
-    """Displacement of the outer surface along itself, (2, nx, ns): [0] along x, [1] along s, each positive the way its
-    coordinate grows; without friction what the press squeezes aside, under a slide what that drags along as well.
-    None: the sensor's spec does not say that its transducer looks at it (`reads_shear`)."""
+    """Displacement of the outer surface along x and s, (2, nx, ns): by the press without friction, and by a slide.
+    None: the sensor's spec does not state that its transducer uses it (`reads_shear`)."""
     shear_mpa: FloatArray | None = None
-    """Shear traction of the indenter on the outer surface, (2, nx, ns), in the same order: positive where it pulls the
-    skin the way the coordinate grows. Its sum over cells times their area is the tangential force on the sensor. Zero
-    while nothing slides: contacts are pressed without friction. None: as above."""
+    """Shear traction of the indenter on the outer surface along x and s, (2, nx, ns), positive where it pulls the skin
+    towards larger coordinates; zero without a slide. Its sum over cells times their area is the tangential force on the
+    sensor. None: as above."""
 
 
 @dataclass(frozen=True)

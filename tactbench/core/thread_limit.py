@@ -14,9 +14,9 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def keep_threads() -> None:
-    """Limit numerical libraries to one thread, as the table's times state; called before one is loaded.
+    """Limit numerical libraries to one thread, as the table's times state; to be called before one is loaded.
 
-    Several threads would also sum in another order on another machine. Values that are set already are kept.
+    Several threads would also sum in another order on another machine. Variables that are set already are kept.
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
@@ -28,11 +28,8 @@ def keep_threads() -> None:
 def thread_limit(threads: int) -> AbstractContextManager[Any]:
     """Return a context in which OpenMP and BLAS use at most `threads` threads.
 
-    Notes
-    -----
-    Finding the libraries that a process has loaded takes threadpoolctl about 2 ms, setting their threads some
-    microseconds. They are looked for again where modules were imported since: that is how libraries come in. A
-    forked process has the libraries that its parent had found.
+    Finding the loaded libraries takes threadpoolctl about 2 ms, setting their threads some microseconds; they are
+    looked for again after further imports.
     """
     limit: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=threads)
     return limit

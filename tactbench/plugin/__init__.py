@@ -5,8 +5,6 @@ one or more of the hooks; ``docs/plugins.md`` shows how. What being simulated ta
 :mod:`tactbench.plugin.simulation`; drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
 """
 
-from typing import TYPE_CHECKING
-
 from tactbench.core.errors import (
     DataError,
     MissingRecordingError,
@@ -16,14 +14,12 @@ from tactbench.core.errors import (
     TactbenchError,
     UsageError,
 )
-from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.samples import Block, Quality, StreamReadings
+from tactbench.core.samples import Block, FloatArray, Quality, StreamReadings
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.profile import ForcePath, ForceRamp
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
@@ -31,6 +27,7 @@ from tactbench.core.spec.rig import (
     EstimatorDescriptor,
     IndenterDescriptor,
     ManualFrame,
+    Parameter,
     ProfileDescriptor,
     RigDescriptor,
     SensorDescriptor,
@@ -46,11 +43,15 @@ from tactbench.core.spec.sensor import (
     Statement,
     StreamSpec,
 )
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
-
-if TYPE_CHECKING:
-    from tactbench.core.samples import FloatArray
+from tactbench.core.spec.task import (
+    ChannelTarget,
+    LabelTarget,
+    PlannedScene,
+    Published,
+    Summary,
+    TaskSpec,
+    VectorTarget,
+)
 
 __all__ = [
     "API_VERSION",
@@ -115,5 +116,3 @@ __all__ = [
     "sourced",
     "staircase",
 ]
-
-__getattr__ = on_demand(__name__)

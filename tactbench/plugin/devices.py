@@ -1,7 +1,6 @@
 """The door to devices: drivers, emulators, links, rig files, and the rigs that use them.
 
-``docs/hardware.md`` shows a driver, ``docs/links.md`` what it speaks through, ``docs/emulation.md`` what stands in for
-the device.
+``docs/hardware.md`` shows a driver, ``docs/links.md`` its links, ``docs/emulation.md`` emulated devices.
 """
 
 from typing import TYPE_CHECKING

@@ -47,7 +47,7 @@ def test_every_name_can_be_imported(door):
     assert [name for name in module.__all__ if not hasattr(module, name)] == []
     with pytest.raises(ImportError, match="Nothing"):
         exec(f"from {door} import Nothing")
-    with pytest.raises(AttributeError, match=f"module '{door}' has no attribute 'Nothing'"):
+    with pytest.raises(AttributeError, match=f"{door}.*Nothing"):
         _ = module.Nothing
 
 

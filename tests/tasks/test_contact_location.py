@@ -41,7 +41,7 @@ def test_the_reference_is_where_the_indenter_was_put(presses):
     for path in presses[:3]:
         with open_recording(path) as recording:
             place = recording.read("contact_point")
-            drawn, hold = recording.meta.drawn, recording.meta.scene.profile.hold.to("s")
+            drawn, hold = recording.meta.drawn, recording.meta.scene.profile.hold_s
             force_n = recording.read("force_torque").data
         missing = np.asarray(place.quality) & Quality.MISSING
         pressing = 1e-9 * (place.t_ns - place.t_ns[0]) > hold

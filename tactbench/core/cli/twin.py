@@ -139,6 +139,6 @@ def verify(ctx: click.Context, shape: str) -> None:
 
 
 def _record(verdict: Verdict) -> dict[str, Any]:
-    numbers = {name: getattr(verdict, name) for name in ("found", "expected", "bound")}
+    numbers = {name: float(getattr(verdict, name)) for name in ("found", "expected", "bound")}
     finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
     return {"met": verdict.met, "what": verdict.name, **finite, "unit": verdict.unit, "source": verdict.source}

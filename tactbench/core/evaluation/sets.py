@@ -25,7 +25,7 @@ def hold_s(meta: RecordingMeta) -> float:
     A scene states it (:class:`ForceRamp.hold`). Recordings without a scene, a clock or a hold at zero force state none,
     and none is inferred from their readings.
     """
-    if meta.scene is None or meta.clock == "none" or meta.scene.profile.start.to("N") != 0:
+    if meta.scene is None or meta.clock == "none" or meta.scene.profile.corners[1][0] != 0:
         return 0.0
     return meta.scene.profile.hold_s
 
@@ -145,7 +145,7 @@ def asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
 
 def dropped_s(meta: RecordingMeta, protocol: ProtocolSpec) -> float:
     """Return how many seconds the protocol drops at the start of a recording: the hold that its scene states."""
-    return meta.scene.profile.hold.to("s") if protocol.discard_hold and meta.scene is not None else 0.0
+    return meta.scene.profile.hold_s if protocol.discard_hold and meta.scene is not None else 0.0
 
 
 def _within_three_sigma(

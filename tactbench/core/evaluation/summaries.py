@@ -17,8 +17,7 @@ from tactbench.core.events.labels import extremes, spread
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, IntArray, StreamReadings
 from tactbench.core.spec.rig import EstimatorDescriptor
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.task import Summary, TaskSpec
 
 Features = Mapping[str, float]
 

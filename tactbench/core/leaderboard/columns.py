@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import Row, answer_name, held_out
-from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.row import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, whole

@@ -12,8 +12,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, metric_name, sign_of
-from tactbench.core.spec.row import LEAKS, plural
-from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.row import LEAKS, STOPPED, plural
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import (
     FEWEST,

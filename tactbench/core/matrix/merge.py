@@ -3,7 +3,7 @@
 The result is the union of the folders' cells, by name. Of two of one name
 
 - finished counts more than not finished; of two that did not finish, the one whose status stands first in
-  `tactbench.core.spec.status.STATUSES` is kept, then the one of the host with the smaller id;
+  `tactbench.core.spec.row.STATUSES` is kept, then the one of the host with the smaller id;
 - two finished ones are equal if configuration, versions and source are, and what a seed decides agrees to a relative
   1e-9: one that was timed, then the one of the host with the smaller id is kept, whole, so that times of two hosts are
   not mixed;
@@ -26,7 +26,7 @@ from typing import Any
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.store import Row, Store, writing
-from tactbench.core.spec.status import STATUSES
+from tactbench.core.spec.row import STATUSES
 
 SAME_SCORE = 1e-9
 """Relative difference of scores of the same cell on two kinds of processor: they add millions of terms in another

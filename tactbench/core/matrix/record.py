@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any
 
 from tactbench.core.plugins.interfaces import Operator, RecordingRequest
@@ -20,7 +19,7 @@ class Recorder:
     def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator
         self._built: Any = None
-        self._registry = replace(registry, tasks=Family("task"))  # tasks would be most of the pickled data
+        self._registry = registry.with_tasks(Family("task"))  # tasks would be most of the pickled data
 
     def __call__(self, request: RecordingRequest) -> None:
         """Make a recording; raises whatever the rig raises."""

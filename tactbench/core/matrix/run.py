@@ -32,7 +32,7 @@ from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, prel
 from tactbench.core.progress import Progress
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.row import STOPPED
 from tactbench.core.spec.task import TaskSpec
 
 EngineName = Literal["in-process", "isolated", "dask"]

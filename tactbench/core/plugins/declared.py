@@ -1,11 +1,10 @@
-"""Tasks that recordings bring with them, beside the installed ones."""
+"""Tasks that are declared beside recordings, in addition to the installed ones."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +21,7 @@ from tactbench.core.spec.yaml_file import load_yaml
 def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
     """Return the tasks of a folder of recordings and of the folders below it, except hidden ones.
 
-    Raises
-    ------
-    ConfigError
-        If a file of them is wrong; the message names its line.
-    UsageError
-        If two files mean different tasks by one name.
+    Raises ConfigError for a file that is not valid, and UsageError if two files have different tasks of one name.
     """
     found: dict[str, tuple[DeclaredTask, Path]] = {}
     paths = []
@@ -47,16 +41,8 @@ def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
 
 
 def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry:
-    """Return the registry with `tasks` in it.
-
-    Raises
-    ------
-    UsageError
-        If one has the name of a task that is installed.
-    """
+    """Return the registry with `tasks` in it; raises UsageError if one has the name of an installed task."""
     each = {task.name: task for task in tasks}
-    if not each:
-        return registry
     family: Family[TaskDescriptor] = Family("task")
     for owned in registry.tasks.all_owned():
         family.add(owned)
@@ -64,19 +50,17 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
         if name in registry.tasks:
             raise UsageError(
                 f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed one.",
-                hint="Give it another name in the mapping and import once more, or in that file.",
+                hint="Rename it in that file, or in the mapping and import once more.",
             )
-        family.add(
-            Owned(TaskDescriptor(spec=task.spec), declared_task.__name__, "recordings", "", task.model_dump_json())
-        )
-    return replace(registry, tasks=family)
+        descriptor = TaskDescriptor(spec=task.spec)
+        family.add(Owned(descriptor, declared_task.__name__, "recordings", "", task.model_dump_json()))
+    return registry.with_tasks(family)
 
 
 def with_declared_of(registry: Registry, rows: Iterable[Mapping[str, Any]]) -> Registry:
     """Return the registry with the tasks in rows of results, the last of each name.
 
-    A row that carries none that can be read, or one of an installed task's name, adds nothing: it may come from a
-    stranger.
+    A task that cannot be read, or that has the name of an installed one, is ignored: rows may come from elsewhere.
     """
     found: dict[str, DeclaredTask] = {}
     for text in dict.fromkeys(str(row.get("declared_task") or "") for row in rows):

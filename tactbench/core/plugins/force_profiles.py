@@ -16,17 +16,8 @@ from tactbench.core.spec.rig import ProfileDescriptor
 def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by: str) -> ForcePath:
     """Return the path of a profile with the parameters `given`, and the others by default.
 
-    Parameters
-    ----------
-    by
-        Who asks for it, for the path's source, which also names the profile with every parameter.
-
-    Raises
-    ------
-    UsageError
-        If it has no such parameter, or one is out of range.
-    PluginContractError
-        If its plugin makes no force path of them.
+    The path's source names `by` (the option or file that selects the profile), the profile and every parameter. Raises
+    UsageError for a parameter that is not valid, and PluginContractError if the plugin returns no force path.
     """
     values = descriptor.values(given)
     what = f"The force profile {descriptor.name!r}"

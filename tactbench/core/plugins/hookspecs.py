@@ -34,39 +34,39 @@ hookimpl = pluggy.HookimplMarker(GROUP)
 
 @hookspec
 def tactbench_sensors() -> Sequence[SensorDescriptor]:  # type: ignore[empty-body]
-    """Return the sensors this plugin brings."""
+    """Return the sensors of the plugin."""
 
 
 @hookspec
 def tactbench_rigs() -> Sequence[RigDescriptor]:  # type: ignore[empty-body]
-    """Return the rigs this plugin brings."""
+    """Return the rigs of the plugin."""
 
 
 @hookspec
 def tactbench_devices() -> Sequence[DeviceDescriptor]:  # type: ignore[empty-body]
-    """Return the force sensors and motors this plugin brings."""
+    """Return the force sensors and motors of the plugin."""
 
 
 @hookspec
 def tactbench_tasks() -> Sequence[TaskDescriptor]:  # type: ignore[empty-body]
-    """Return the tasks this plugin brings."""
+    """Return the tasks of the plugin."""
 
 
 @hookspec
 def tactbench_estimators() -> Sequence[EstimatorDescriptor]:  # type: ignore[empty-body]
-    """Return the estimators this plugin brings."""
+    """Return the estimators of the plugin."""
 
 
 @hookspec
 def tactbench_effects() -> Sequence[EffectDescriptor]:  # type: ignore[empty-body]
-    """Return the simulation effects this plugin brings."""
+    """Return the simulation effects of the plugin."""
 
 
 @hookspec
 def tactbench_indenters() -> Sequence[IndenterDescriptor]:  # type: ignore[empty-body]
-    """Return the shapes of indenters this plugin brings."""
+    """Return the shapes of indenters of the plugin."""
 
 
 @hookspec
 def tactbench_profiles() -> Sequence[ProfileDescriptor]:  # type: ignore[empty-body]
-    """Return the force profiles this plugin brings."""
+    """Return the force profiles of the plugin."""

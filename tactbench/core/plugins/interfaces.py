@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Acquisition(Protocol):
-    """A scene that is being carried out: iteration yields its blocks, and the attributes remain valid afterwards."""
+    """A scene that is carried out by iterating over its blocks; the attributes remain valid afterwards."""
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -43,21 +43,18 @@ class Acquisition(Protocol):
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """Facts that were drawn or achieved, for example the placement.
-
-        Texts whose names start with ``remark`` and a blank are shown with every score from the recording.
-        """
+        """Facts that were drawn or achieved: the placement; ``remark …`` are texts that are shown with every score."""
 
     def __iter__(self) -> Iterator[Block]: ...
 
 
 class SimulatedPress(Acquisition, Protocol):
-    """A simulated acquisition that also has a force curve of the skin, for an emulated motor."""
+    """A simulated acquisition with a force curve of the skin, for an emulated motor."""
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
         """Return the indenter's depths, (n,) [m] ascending from the first touch, and the forces at them, (n,) [N].
 
-        The last force is `largest_n`. The curve is that of a slow press: the same on the way in and out.
+        The last force is `largest_n`. The curve is that of a slow press, without hysteresis.
         """
 
 
@@ -88,7 +85,7 @@ class DeviceLog:
     clock: Literal["device", "host", "nominal", "none"]
     """Origin of the times: the device, the host that wrote the log, row number by nominal rate, or none."""
     started: str = ""
-    """Time at which the log was begun, as the file states it; empty if it does not."""
+    """Time at which the log was begun, as the file states it; empty: it states none."""
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from the log."""
     counts: Mapping[str, int] = field(default_factory=dict)
@@ -124,28 +121,27 @@ class Explained(NamedTuple):
 
     entry: PlanEntry
     cost_s: float | None
-    """Seconds that it takes, or would take, per recording on this machine; None: not measured, or not separable from
-    another effect's."""
+    """Time of the effect for a recording on this machine [s]; None: not measured, or not separable from another's."""
     remark: str = ""
-    """Reason for the lack of a cost, where it helps."""
+    """Reason for the lack of a cost."""
 
 
 class Explaining(Rig, Protocol):
     """A simulated rig that explains its plan and the cost of each effect."""
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
-        """Return every installed effect, those included first, in the order in which they are applied.
+        """Return every installed effect, the included ones first, in the order in which they are applied.
 
-        `rounds` > 0 carries the scene out so many times and gives the median cost of each effect.
+        `rounds` > 0 carries the scene out that often, for the median cost of each effect.
         """
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A number beside the one that a law or a closed form gives."""
+    """A computed number beside that of a law or a closed form."""
 
     name: str
-    """Quantity that was computed, in one line: ``Hertz: depth under a paraboloid``."""
+    """Quantity that was computed: ``Hertz: depth under a paraboloid``."""
     found: float
     expected: float
     bound: float
@@ -154,15 +150,10 @@ class Verdict:
     source: str = ""
     """The law with its source, and the reason for the bound."""
 
-    def __post_init__(self) -> None:
-        """Convert the numbers to floats, as JSON has no NumPy scalars."""
-        for name in ("found", "expected", "bound"):
-            object.__setattr__(self, name, float(getattr(self, name)))
-
     @property
     def met(self) -> bool:
         """Whether the two agree within the bound; NaN never does."""
-        return abs(self.found - self.expected) <= self.bound
+        return bool(abs(self.found - self.expected) <= self.bound)
 
 
 @dataclass(frozen=True)
@@ -199,7 +190,7 @@ class CostPoint:
     label: str
     """Short name of the way: ``default, 48 x 64, 16 nodes``."""
     seconds: float
-    """Median time of one piece of work, which the diagram's title names."""
+    """Median time of the work that the diagram's title names."""
     error: float
     """Root mean square of the difference to the reference."""
     worst: float
@@ -208,9 +199,9 @@ class CostPoint:
     floor: float
     """Standard deviation of the observable's own noise; infinity where it has none."""
     default: bool = False
-    """Whether this is the default way."""
+    """Whether this is the default."""
     rung: str = ""
-    """Name of the rung that this way is; empty: it is none."""
+    """Name of the rung that this is; empty: it is none."""
     settings: Mapping[str, Scalar] = field(default_factory=dict)
     """Settings of this way."""
 
@@ -220,7 +211,7 @@ class CostJob(NamedTuple):
 
     label: str
     run: Callable[[], list[CostPoint]]
-    """Function that measures it; it raises a TactbenchError, which becomes a row, if this sensor cannot have it."""
+    """Function that measures it; a TactbenchError that it raises, where it cannot be measured, becomes a row."""
     rung: str = ""
     """The rung of its points."""
 
@@ -232,11 +223,11 @@ class CostStudy(NamedTuple):
     reference: str
     """Reference of the errors, in one sentence."""
     jobs: Sequence[CostJob]
-    """Measurements in order; the first computes the reference as well."""
+    """Measurements in order; the first also computes the reference."""
 
 
 class ReplayRig(Protocol):
-    """A rig whose scenes were carried out elsewhere, and which has their recordings."""
+    """A rig with recordings of scenes that were carried out elsewhere."""
 
     def recordings(self) -> Sequence[Path]:
         """Return the files, in a fixed order; raises MissingRecordingError if there are none."""
@@ -320,7 +311,7 @@ class EffectRun(Protocol):
         """Return the generator for draws that the recordings of a session share."""
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator for draws of this recording alone."""
+        """Return the generator for draws of this recording only."""
 
 
 class Estimator(Protocol):
@@ -342,13 +333,13 @@ class Operator(Protocol):
 
 @dataclass(frozen=True)
 class RigContext:
-    """Context that is passed to ``RigDescriptor.where`` to build a rig."""
+    """Argument of ``RigDescriptor.where``, which builds a rig."""
 
     effects: tuple[EffectDescriptor, ...] = ()
-    """The effects of tactbench itself: candidates for every scene."""
+    """The effects of tactbench, which are candidates for every scene."""
     named_effects: tuple[EffectDescriptor, ...] = ()
-    """The installed effects of other packages: candidates where the sensor or the scene names them, see
-    :func:`tactbench.plugin.simulation.effect_names`."""
+    """The installed effects of other packages, which are candidates where
+    :func:`tactbench.plugin.simulation.effect_names` has their names."""
     indenters: tuple[IndenterDescriptor, ...] = ()
     """All installed shapes of indenters; the twin presses with them."""
     recordings: Path | None = None

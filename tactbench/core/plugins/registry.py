@@ -1,8 +1,8 @@
-"""The registry of plugins: each is loaded alone, and every failure is kept as a row.
+"""The registry of plugins: each is loaded separately, and every failure is kept as a row.
 
-Three holes of plain pluggy are closed here: a plugin that fails on import stops no other; a name that two plugins give
-is refused, naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in child
-processes, which return data: whatever an import does to its process has no effect on others.
+A plugin that fails on import stops no other; a name that two plugins give is refused, naming both distributions; a
+misspelt hook is an error. Plugins of other distributions are imported in child processes, which return data: whatever
+an import does to its process has no effect on others.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
@@ -26,7 +27,6 @@ from tactbench.core.errors import (
     PluginError,
     UnknownNameError,
     UsageError,
-    nearest,
 )
 from tactbench.core.plugins import hookspecs
 from tactbench.core.spec.rig import (
@@ -62,14 +62,14 @@ class PluginRow:
 
 @dataclass(frozen=True)
 class Owned(Generic[D]):
-    """A descriptor, and the plugin that brings it."""
+    """A descriptor, and the plugin that defines it."""
 
     descriptor: D
     module: str
     distribution: str
     version: str
     declared: str = ""
-    """Declaration of a task that came with recordings, as JSON; empty: a plugin brings it."""
+    """Declaration of a task that came with recordings, as JSON; empty: a plugin defines it."""
 
     @property
     def ours(self) -> bool:
@@ -85,19 +85,11 @@ class Family(Generic[D]):
     _found: dict[str, list[Owned[D]]] = field(default_factory=dict)
 
     def add(self, owned: Owned[D]) -> None:
-        """Add a descriptor; a name that is given twice is refused when it is used."""
+        """Add a descriptor; a name that is given twice is refused on use."""
         self._found.setdefault(owned.descriptor.name, []).append(owned)
 
     def owned(self, name: str) -> Owned[D]:
-        """Return the descriptor called `name` with its owner.
-
-        Raises
-        ------
-        UnknownNameError
-            If nothing has this name.
-        DuplicateNameError
-            If two distributions give it.
-        """
+        """Return the descriptor called `name` with its owner; raises UnknownNameError or DuplicateNameError."""
         if name not in self._found:
             raise UnknownNameError(self.kind, name, self.names())
         if len(self._found[name]) > 1:
@@ -130,36 +122,35 @@ class Family(Generic[D]):
         return DuplicateNameError(self.kind, name, where)
 
 
-@dataclass
 class Registry:
     """Everything that is installed, by kind."""
 
-    sensors: Family[SensorDescriptor] = field(default_factory=lambda: Family("sensor"))
-    rigs: Family[RigDescriptor] = field(default_factory=lambda: Family("rig"))
-    devices: Family[DeviceDescriptor] = field(default_factory=lambda: Family("device"))
-    tasks: Family[TaskDescriptor] = field(default_factory=lambda: Family("task"))
-    estimators: Family[EstimatorDescriptor] = field(default_factory=lambda: Family("estimator"))
-    effects: Family[EffectDescriptor] = field(default_factory=lambda: Family("effect"))
-    indenters: Family[IndenterDescriptor] = field(default_factory=lambda: Family("indenter"))
-    profiles: Family[ProfileDescriptor] = field(default_factory=lambda: Family("profile"))
-    plugins: list[PluginRow] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.sensors: Family[SensorDescriptor] = Family("sensor")
+        self.rigs: Family[RigDescriptor] = Family("rig")
+        self.devices: Family[DeviceDescriptor] = Family("device")
+        self.tasks: Family[TaskDescriptor] = Family("task")
+        self.estimators: Family[EstimatorDescriptor] = Family("estimator")
+        self.effects: Family[EffectDescriptor] = Family("effect")
+        self.indenters: Family[IndenterDescriptor] = Family("indenter")
+        self.profiles: Family[ProfileDescriptor] = Family("profile")
+        self.plugins: list[PluginRow] = []
+
+    def with_tasks(self, tasks: Family[TaskDescriptor]) -> Registry:
+        """Return the registry with other tasks."""
+        found = copy(self)
+        found.tasks = tasks
+        return found
 
     def families(self) -> Mapping[str, Family[Any]]:
         """Return the families by the plural in the name of their hook."""
         return {name: getattr(self, name) for name in _KINDS}
 
     def first_rig(self, kind: Literal["simulated", "replays"]) -> str:
-        """Return the name of the default rig of a kind: one of ours, or else the first.
-
-        Raises
-        ------
-        UsageError
-            If there is none.
-        """
+        """Return the name of the default rig of a kind: one of ours, or else the first; raises UsageError if none."""
         able = [one for one in self.rigs.all_owned() if getattr(one.descriptor, kind)]
         if not able:
-            what = "simulated rig" if kind == "simulated" else "rig that replays"
-            raise UsageError(f"No {what} is installed.", hint="See `tactbench list plugins`.")
+            raise UsageError(f"No rig of kind {kind!r} is installed.", hint="See `tactbench list plugins`.")
         return min(able, key=lambda one: not one.ours).descriptor.name
 
     @property
@@ -179,24 +170,20 @@ _KINDS: dict[str, type[Any]] = {
 """Classes of descriptors by the plural in hooks and families: ``sensors`` -> SensorDescriptor."""
 
 
-ENTRY_POINT_S = 20.0
-"""Longest time that the import of a plugin and its hooks may take [s]."""
-
-
-def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = ENTRY_POINT_S) -> Registry:
-    """Load every plugin of the entry-point group, each one alone.
+def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = 20.0) -> Registry:
+    """Load every plugin of the entry-point group, each one separately.
 
     Parameters
     ----------
     points
         Entry points to load instead of the installed ones.
     timeout_s
-        Seconds that each may take.
+        Longest time that the import of a plugin and its hooks may take [s].
 
     Returns
     -------
     Registry
-        What could be loaded, and a row for each plugin that could not. Never raises for a bad plugin.
+        The plugins that could be loaded, and a row for each that could not. No error is raised for a bad plugin.
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
@@ -273,10 +260,7 @@ def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
 def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     """Import a plugin in this process, and return its checked descriptors by family.
 
-    Raises
-    ------
-    PluginError
-        If it does not keep the contract of its hooks; and whatever its own code raises.
+    Raises PluginError if it does not keep the contract of its hooks, and any error of its own code.
     """
     _check_api_version(point.value, _stated_version(point.value))
     module = cast(ModuleType, point.load())
@@ -284,16 +268,11 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
-    known = {f"tactbench_{family}" for family in _KINDS}
-    for name in sorted(vars(module)):
-        close = nearest(name, known) if name.startswith("tactbench_") and name not in known else []
-        if close and hasattr(getattr(module, name), f"{hookspecs.GROUP}_impl"):
-            raise PluginContractError(f"{point.value}: there is no hook {name}.", hint=f"Is {close[0]} meant?")
     manager.check_pending()
     callers = manager.get_hookcallers(module) or []
     if not callers and not _mappings_beside(module):
         raise PluginContractError(
-            f"{point.value} implements none of {', '.join(sorted(known))}.",
+            f"{point.value} implements none of {', '.join(f'tactbench_{family}' for family in _KINDS)}.",
             hint="Decorate a function of that name with tactbench.plugin.hookimpl.",
         )
     offered: dict[str, list[Any]] = {}
@@ -312,15 +291,12 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 
 
 def _mappings_beside(module: ModuleType) -> bool:
-    """Return whether a package brings mappings of data sets: see tactbench.core.recording.datasets."""
+    """Return whether a package has mappings of data sets: see tactbench.core.recording.datasets."""
     return any(any(Path(folder).glob("datasets/*.yaml")) for folder in getattr(module, "__path__", ()))
 
 
 def _stated_version(module: str) -> object:
-    """Return the version that the source of a module states by a number of its own; else this one.
-
-    It is looked at before the import, which may fail where another version is spoken.
-    """
+    """Return the version that the source of a module states, else this one: its import may fail in another version."""
     spec = find_spec(module)
     if spec is None or not (spec.origin or "").endswith(".py"):
         return hookspecs.API_VERSION
@@ -331,13 +307,12 @@ def _stated_version(module: str) -> object:
 
 def _check_api_version(module: str, written_for: object) -> None:
     """Raise PluginContractError if a plugin states another version of the interface than this one."""
-    spoken = hookspecs.API_VERSION
-    if written_for == spoken:
+    here = hookspecs.API_VERSION
+    if written_for == here:
         return
-    stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
     raise PluginContractError(
-        f"{module} states {stated}; the plugin interface here is {spoken}.",
-        hint=f"Write TACTBENCH_API = {spoken} in it, or update the older of the two: see docs/stability.md.",
+        f"{module} states TACTBENCH_API = {written_for!r}; the plugin interface here is {here}.",
+        hint=f"Write TACTBENCH_API = {here} in it, or update the older of the two: see docs/stability.md.",
     )
 
 
@@ -348,13 +323,7 @@ def _owner(distribution: Distribution | None) -> tuple[str, str]:
 
 
 def load_object(where: str) -> Any:
-    """Return the object that a descriptor's ``module:attribute`` names.
-
-    Raises
-    ------
-    PluginError
-        If the module cannot be imported or has no such attribute; the cause is chained.
-    """
+    """Return the object that ``module:attribute`` names; raises PluginError if it cannot be imported."""
     module, _, attribute = where.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)

@@ -1,7 +1,7 @@
 """Building of rigs, with their rig files and the effects that take part.
 
-The effects of this package are candidates for every scene. An effect of another package is a candidate only where the
-sensor's descriptor or the scene names it: what is merely installed is not imported into a run, and stands in no key.
+The effects of this package are candidates for every scene; those of another one only where the sensor's descriptor or
+the scene names them, so that a package that is merely installed is not imported into a run, and stands in no key.
 """
 
 from __future__ import annotations
@@ -20,14 +20,9 @@ from tactbench.core.spec.scene import Scene
 
 
 def load_rig_file(path: Path, registry: Registry) -> RigFile:
-    """Return the rig file at `path`; a rig that has a model of its own settings checks them.
+    """Return the rig file at `path`, its settings checked by the model of its rig where there is one.
 
-    Raises
-    ------
-    ConfigError
-        If it cannot be read, or says something unknown or wrong; the message names the line.
-    UnknownNameError
-        If no such rig is installed.
+    Raises ConfigError, which names the line, if it is not valid, and UnknownNameError if the rig is not installed.
     """
     from tactbench.core.spec.yaml_file import load_yaml
 
@@ -48,12 +43,7 @@ def rig_of(
 ) -> Rig | ReplayRig:
     """Return the rig called `name`.
 
-    Raises
-    ------
-    UsageError
-        If the rig file is for another one.
-    RigError
-        If its own code fails, whatever that raises, or its devices cannot be emulated.
+    Raises UsageError if the rig file is for another one, and RigError if its own code fails.
     """
     descriptor = registry.rigs[name]
     if rig_file is not None:
@@ -72,9 +62,7 @@ def failing_as(what: str) -> Iterator[None]:
     except TactbenchError:
         raise
     except (Exception, SystemExit) as error:
-        raise RigError(
-            f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for who brings it."
-        ) from error
+        raise RigError(f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for its plugin.") from error
 
 
 def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:
@@ -84,7 +72,7 @@ def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> l
 
 
 def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
-    """Return the names of effects, and of groups of them, that the sensor's descriptor or the scene names.
+    """Return the names of effects and of groups of effects in the sensor's descriptor and in the scene.
 
     A simulated rig considers those of its context's `named_effects` that are among them.
     """
@@ -92,7 +80,7 @@ def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
 
 
 def rig_context(registry: Registry, **given: Any) -> RigContext:
-    """Return the context of a rig: the registry's effects and indenters, and what else is `given`."""
+    """Return the context of a rig: the registry's effects and indenters, and the fields `given`."""
     owned = registry.effects.all_owned()
     return RigContext(
         effects=tuple(one.descriptor for one in owned if one.ours),

@@ -1,28 +1,22 @@
-"""Tasks that come with recordings: the mapping that imports them declares them as data, without code."""
+"""Tasks that a mapping of recordings declares as data, without code."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import complaint
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.sensor import ChannelKind
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, TaskSpec, VectorTarget
+from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, Summary, TaskSpec, VectorTarget
 
 FILE = "tasks.yaml"
-"""Name of the file beside recordings with the tasks that their mapping declares."""
+"""Name of the file of these tasks beside the recordings."""
 
-Metric = Literal[
-    "rmse", "mae", "r2", "mean_euclidean_error", "macro_f1", "accuracy", "balanced_accuracy"
-]  # fmt: skip
-_METRICS: dict[str, tuple[Metric, ...]] = {
-    "number": ("rmse", "mae", "r2"),
-    "vector": (VECTOR_METRIC,),
-    "class": ("macro_f1", "accuracy", "balanced_accuracy"),
-}
+_METRICS = {
+    "number": ("rmse", "mae", "r2"), "vector": (VECTOR_METRIC,), "class": ("macro_f1", "accuracy", "balanced_accuracy"),
+}  # fmt: skip
 """Metrics of each kind of answer, the default first."""
 _ESTIMATORS = {"number": ("forest", "ridge"), "vector": ("forest-100", "ridge"), "class": ("forest", "logistic")}
 _BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index"), "class": ("majority", "chance")}
@@ -39,7 +33,7 @@ class DeclaredTask(Frozen):
     target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
     answer: Literal["number", "class"] | None = None
     """Whether a label is a number or, by default, a class; None for a channel."""
-    metric: Metric | None = None
+    metric: str | None = None
     """Metric; None: the first that fits the target."""
     splits: tuple[str, ...] = Field(min_length=1)
     """Splits, the default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
@@ -65,28 +59,26 @@ class DeclaredTask(Frozen):
     @model_validator(mode="after")
     def _makes_a_task(self) -> DeclaredTask:
         if self.answer is not None and not isinstance(self.target, LabelTarget):
-            raise ValueError("answer says how a label is read; a channel is a number")
+            raise ValueError("answer: class or number is for labels; a channel is a number")
         if self.metric is not None and self.metric not in _METRICS[self._answer]:
             raise ValueError(f"a {self._answer} is scored by {', '.join(_METRICS[self._answer])}, not by {self.metric}")
         try:
-            self.spec  # noqa: B018  (what the task would refuse is refused here, in the file that declares it)
+            self.spec  # noqa: B018  (a task that is not valid is refused in the file that declares it)
         except ValidationError as error:
             raise ValueError(complaint(error)) from error
         return self
 
     @property
     def spec(self) -> TaskSpec:
-        """The same task as a plugin would bring it."""
+        """The same task as a plugin would declare it."""
         answer, metric = self._answer, self.metric or _METRICS[self._answer][0]
         unit = self.target.unit if metric in ("rmse", "mae", VECTOR_METRIC) else "1"
-        return TaskSpec(
-            name=self.name, title=self.title or self.name, question=self.question or f"What is {self.name}?",
-            kind="classification" if answer == "class" else "regression", features=self.features,
-            optional_features=self.optional_features, target=self.target, answer_per=self.answer_per,
-            summaries=self.summaries, vote=self.vote, metric=metric, unit=unit, equivalence=self.equivalence,
-            protocols=self.protocols, splits=self.splits, estimators=self.estimators or _ESTIMATORS[answer],
-            baselines=self.baselines or _BASELINES[answer],
-        )  # fmt: skip
+        more: dict[str, Any] = {
+            "title": self.title or self.name, "question": self.question or f"What is {self.name}?", "unit": unit,
+            "kind": "classification" if answer == "class" else "regression", "metric": metric,
+            "estimators": self.estimators or _ESTIMATORS[answer], "baselines": self.baselines or _BASELINES[answer],
+        }  # fmt: skip
+        return TaskSpec.model_validate({**{key: value for key, value in self if key != "answer"}, **more})
 
 
 class TaskFile(Frozen):

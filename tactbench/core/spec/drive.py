@@ -1,4 +1,4 @@
-"""Model of a linear motor that presses with a wanted force: controller, filter, and limits of the motor."""
+"""Model of a linear motor under force control: controller, filter, and limits of the motor."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ _PAPER_LOOP = "Karl et al. 2016 state a low-pass filter in the loop; neither con
 class ForceLoop(Frozen):
     """A force loop around a position-controlled linear motor.
 
-    The force sensor is read once per step, filtered, and a proportional-integral controller on its difference from
-    the profile commands the motor's position. The defaults describe a plausible rig, not the paper's: it names none
-    of these numbers.
+    Once per step, the force is read and filtered, and a proportional-integral controller on its difference from the
+    profile commands the motor's position. The defaults are plausible; the paper states none of them.
     """
 
     kind: Literal["force loop"] = "force loop"
@@ -25,12 +24,11 @@ class ForceLoop(Frozen):
     cutoff: Quantity | None = assumed(1.0, "Hz", f"{_PAPER_LOOP}: no cut-off either")
     """Cut-off of the first-order low-pass on the measured force [1/time]; None: there is no filter."""
     rate: Quantity | None = None
-    """Rate of the loop [1/time]; None: that of the reference clock, as with an embedded system that also reads the
-    sensors."""
+    """Rate of the loop [1/time]; None: that of the reference clock."""
     delay: Quantity = assumed(
         10.0, "ms", "RS232, as the paper says, at 9600 baud: a command and its answer of 9 to 10 bytes of 10 bits"
     )
-    """Time from reading the force until the motor has the command [time]; it is rounded up to whole steps."""
+    """Time from reading the force to the motor's receiving the command [time], rounded up to whole steps."""
     motor_lag: Quantity = assumed(10.0, "ms", "closed position loop of a small linear motor; no source")
     """Time constant with which the motor approaches a commanded position [time]."""
     speed: Quantity = assumed(50.0, "mm/s", "small linear motors reach metres per second; set low for pressing")

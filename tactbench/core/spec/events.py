@@ -24,8 +24,8 @@ def nanoseconds(seconds: float) -> int:
 class AlarmPolicy(Frozen):
     """Rules by which frames of a detector become alarms, and alarms become hits or false alarms.
 
-    No field has a default. A hidden one may decide the result: those of timescoring 0.0.7, made for seizures (30 s
-    before, 60 s after, merging below 90 s), give F1 = 1 to a detector whose last alarm comes 10 s after the event.
+    No field has a default, as a hidden one may decide the result: those of timescoring 0.0.7, made for seizures, give
+    F1 = 1 to a detector whose last alarm comes 10 s after the event.
     """
 
     window_before_s: Seconds
@@ -39,8 +39,8 @@ class AlarmPolicy(Frozen):
     minimum_length_s: Seconds
     """Time after which a segment raises its one alarm, at its next active frame [s]."""
     false_alarm_time: Literal["disturbances", "non-events"]
-    """Stretches in which false alarms are counted, and whose seconds divide them: the declared disturbances, or all of
-    the recording; events and their windows are left out of both."""
+    """Stretches in which false alarms are counted, per minute of them: the declared disturbances or the recording,
+    both without events and their windows."""
 
     def __str__(self) -> str:
         return (
@@ -73,7 +73,7 @@ class SlipThresholds(Frozen):
     def scaled(self, factor: float) -> SlipThresholds:
         """Return thresholds with displacement, slip share and stick ratio multiplied by `factor`.
 
-        How long a hold lasts and what a contact is are not scaled: they say where labels exist, not where they part.
+        `hold_s` and `contact_force_n` are not scaled: they decide where labels exist.
         """
         names = ("gross_displacement_m", "incipient_slip_share", "gross_stick_ratio")
         changed = {name: factor * getattr(self, name) for name in names}
@@ -84,15 +84,14 @@ THRESHOLDS = SlipThresholds(
     hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05
 )
 """The thresholds of the published tasks. All five are assumed, as no source states them for a whole contact. They
-detect slip faster than 1 mm/s, or by steps of more than 0.1 mm. Halving and doubling them shows how a score depends on
-them (`tactbench.core.evaluation.slip_reference`)."""
+detect slip faster than 1 mm/s, or by steps of more than 0.1 mm."""
 
 
 class SlipTarget(Frozen):
-    """The target of frames: whether the contact slips, by the reference alone.
+    """The target of frames: whether the contact slips, by the reference.
 
-    It needs forces called `normal` and `tangential` and a length called `slip`, the displacement of surface and skin
-    against each other, all on one clock; and the coefficient of friction as a label of the recording.
+    The reference has forces `normal` and `tangential` and a length `slip`, the displacement of surface and skin against
+    each other, on one clock; the recording has the coefficient of friction as a label.
     """
 
     source: Literal["slip"] = "slip"
@@ -104,7 +103,7 @@ class SlipTarget(Frozen):
     friction: str = "friction_coefficient"
     """Label of a recording that holds the static coefficient of friction [1]."""
     disturbance: tuple[str, str] = ("event", "disturbance")
-    """Label of a recording, and the value of it that marks the recording as a disturbance without slip."""
+    """Label of a recording, and its value for a disturbance without slip."""
 
     def __str__(self) -> str:
         return f"frames of {self.window_s:g} s, one every {self.hop_s:g} s"

@@ -1,9 +1,8 @@
-"""Force profiles by name: a staircase, a held press and a sine, in newtons, seconds and hertz."""
+"""Force profiles by name: a staircase, a held press and a sine. Their forces are in N, times in s and rates in Hz."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec.profile import ForcePath
@@ -27,27 +26,16 @@ def staircase(
 
     Parameters
     ----------
-    peak
-        Force of the highest level [N].
-    steps
-        Levels above zero, a whole number [1].
-    dwell
-        How long each level is held [s].
-    rise
-        How long the way to the next level takes, above 0 [s].
-    hold
-        How long nothing presses before the first step [s].
+    peak, steps
+        Force of the highest level [N], and the number of levels above zero: a whole one, or UsageError is raised.
+    dwell, rise, hold
+        Times at each level, for each step (above 0), and without load before the first step [s].
     rate
-        Samples of the reference clock [Hz].
-
-    Raises
-    ------
-    UsageError
-        If `steps` is no whole number from 1 on.
+        Rate of the reference clock [Hz].
     """
     count = _whole("staircase", "steps", steps)
     levels = [peak * level / count for level in (*range(1, count + 1), *range(count - 1, -1, -1))]
-    return _path("staircase", [(hold, 0.0), *((span, level) for level in levels for span in (rise, dwell))], rate)
+    return _path("staircase", rate, (hold, 0.0), *((span, level) for level in levels for span in (rise, dwell)))
 
 
 def press_hold_release(
@@ -66,20 +54,14 @@ def press_hold_release(
     ----------
     peak
         Force that is held [N].
-    rise
-        How long pressing takes, above 0 [s].
-    dwell
-        How long the force is held [s].
-    release
-        How long releasing takes, above 0 [s].
-    rest
-        How long nothing presses afterwards [s].
-    hold
-        How long nothing presses before [s].
+    rise, dwell, release
+        Times of pressing (above 0), of holding the force, and of releasing (above 0) [s].
+    rest, hold
+        Times without load after and before the press [s].
     rate
-        Samples of the reference clock [Hz].
+        Rate of the reference clock [Hz].
     """
-    return _path("press-hold-release", [(hold, 0.0), (rise, peak), (dwell, peak), (release, 0.0), (rest, 0.0)], rate)
+    return _path("press-hold-release", rate, (hold, 0.0), (rise, peak), (dwell, peak), (release, 0.0), (rest, 0.0))
 
 
 def sine(
@@ -98,25 +80,14 @@ def sine(
 
     Parameters
     ----------
-    mean
-        About which it swings [N].
-    amplitude
-        By how much it swings to either side, at most `mean` [N].
-    frequency
-        Periods a second [Hz].
-    periods
-        How many, a whole number [1].
-    rise
-        How long the way from zero to the lowest force takes, above 0 [s].
-    hold
-        How long nothing presses before [s].
+    mean, amplitude
+        Mean of the force, and amplitude of the swing [N]. UsageError is raised if the amplitude exceeds the mean.
+    frequency, periods
+        Frequency [Hz], and the number of periods: a whole one, or UsageError is raised.
+    rise, hold
+        Time from zero to the lowest force (above 0), and without load before [s].
     rate
-        Samples of the reference clock [Hz].
-
-    Raises
-    ------
-    UsageError
-        If it would pull, or `periods` is no whole number from 1 on.
+        Rate of the reference clock [Hz].
     """
     if amplitude > mean:
         raise UsageError(
@@ -126,25 +97,24 @@ def sine(
         )
     points = _whole("sine", "periods", periods) * PER_PERIOD
     step = 1.0 / (frequency * PER_PERIOD)
-    swing = [(step, mean - amplitude * math.cos(2 * math.pi * point / PER_PERIOD)) for point in range(1, points + 1)]
-    return _path("sine", [(hold, 0.0), (rise, mean - amplitude), *swing], rate)
+    swing = ((step, mean - amplitude * math.cos(2 * math.pi * point / PER_PERIOD)) for point in range(1, points + 1))
+    return _path("sine", rate, (hold, 0.0), (rise, mean - amplitude), *swing)
 
 
 def _whole(profile: str, name: str, given: float) -> int:
     """Return `given` as a count; raises UsageError if it is no whole number from 1 on."""
     if given < 1 or given != int(given):
         raise UsageError(
-            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number from 1 on is expected.",
-            hint="For example 5.",
+            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number from 1 on is expected."
         )
     return int(given)
 
 
-def _path(name: str, spans: Sequence[tuple[float, float]], rate_hz: float) -> ForcePath:
-    """Return the path from 0 N over `spans`: how long each takes [s], and the force at its end [N]."""
+def _path(name: str, rate_hz: float, *spans: tuple[float, float]) -> ForcePath:
+    """Return the path from 0 N over `spans`: the duration of each [s], and the force at its end [N]."""
     times, forces = [0.0], [0.0]
     for span, force in spans:
-        if span > 0 or force != forces[-1]:  # a force that jumps is refused by the path
+        if span > 0 or force != forces[-1]:  # ForcePath refuses a force that jumps
             times.append(times[-1] + span)
             forces.append(force)
     return ForcePath(

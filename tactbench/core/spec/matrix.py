@@ -1,4 +1,4 @@
-"""Model of ``benchmarks.yaml``: which tasks which sensors answer, and how."""
+"""Model of ``benchmarks.yaml``: sensors, tasks, and how their cells are run."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ def _names(given: Any) -> Any:
 
 
 REPLICATES = 8
-"""Default number of replicates of a simulated cell; of so many, one outlier moves neither end of a 95 % interval by
-much."""
+"""Default number of replicates of a simulated cell, at which one outlier hardly moves a 95 % interval."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 """One name or a list of names."""
@@ -45,12 +44,12 @@ class TaskChoice(Frozen):
     protocol: Names = ()
     """Protocols, each with cells of its own; empty: the first of the task."""
     split: Names = ()
-    """Splits, each with cells of its own; empty: the first of the task that the recordings can serve. `few-shot` stands
-    for all of the task's splits `few-shot-N`."""
+    """Splits, each with cells of its own; empty: the task's first that the recordings can serve. `few-shot` stands for
+    all of the task's splits `few-shot-N`."""
     estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] | None = None
     """Estimators beside the baselines, which are always run; None: those of the task."""
     dataset: str | None = None
-    """Name or mapping file of a public data set on which this task is run, in place of the recordings of the matrix."""
+    """Name or mapping file of a public data set for this task, in place of the recordings of the matrix."""
 
 
 class ComparisonChoice(Frozen):
@@ -77,8 +76,8 @@ class MatrixSpec(Frozen):
     version: Literal[1] = 1
     seed: int = Field(default=1, ge=0)
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
-    """Number of replicates, each recorded and answered anew with another seed. None: eight on a simulated rig; on
-    recordings one, whose sessions are the replicates."""
+    """Number of replicates, each recorded and answered with another seed. None: eight on a simulated rig; one on
+    recordings, whose sessions are the replicates."""
     rig: str = ""
     """Name of the rig; empty: the simulated one (:meth:`~tactbench.core.plugins.registry.Registry.first_rig`)."""
     recordings: str | None = None
@@ -90,16 +89,15 @@ class MatrixSpec(Frozen):
     memory_mb: int | None = Field(default=None, ge=1, le=MOST_MEMORY_MB)
     """Most memory that a cell or a recording may take beyond what all share [MB of 2**20 bytes]."""
     probe: bool = False
-    """Whether cells are run that show what recordings give away; see docs/real-recordings.md."""
+    """Whether cells are run that show leaks of recordings; see docs/real-recordings.md."""
     latency: bool = True
     """Whether the time of answering one row is measured, which takes up to 0.3 s a cell."""
     include_incomplete: bool = False
-    """Whether recordings take part that lack more than their rig file allows."""
+    """Whether recordings are used that lack more than their rig file allows."""
     simulation: Simulation = Simulation()
     """Settings with which a simulated rig carries out every scene."""
     sensors: tuple[str, ...] = ()
     """Names of sensors; empty: all of which the rig has recordings."""
     tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)
     comparisons: tuple[ComparisonChoice, ...] = ()
-    """Comparisons that are planned in advance: their p-values are corrected for their number; others are
-    exploratory."""
+    """Comparisons that are planned in advance, whose p-values are corrected for their number."""

@@ -55,7 +55,6 @@ class ForcePath(Frozen):
     samples: int = Field(ge=1)
     """Number of samples of the reference clock over the whole recording."""
     source: Source
-    """Source of these forces."""
 
     @model_validator(mode="after")
     def _runs(self) -> ForcePath:
@@ -64,22 +63,6 @@ class ForcePath(Frozen):
         if self.times_s[0] != 0 or any(b <= a for a, b in pairwise(self.times_s)):
             raise ValueError("the times of a force path ascend from 0 s")
         return self
-
-    @property
-    def start(self) -> Quantity:
-        """Force at the first sample."""
-        return Quantity(value=self.forces_n[0], unit="N", source=self.source)
-
-    @property
-    def end(self) -> Quantity:
-        """Force at the end."""
-        return Quantity(value=self.forces_n[-1], unit="N", source=self.source)
-
-    @property
-    def hold(self) -> Quantity:
-        """Time for which the force stays at its start."""
-        still = takewhile(lambda point: point[1] == self.forces_n[0], zip(self.times_s, self.forces_n, strict=True))
-        return Quantity(value=max(time for time, _ in still), unit="s", source=self.source)
 
     @property
     def duration(self) -> Quantity:
@@ -94,7 +77,8 @@ class ForcePath(Frozen):
     @property
     def hold_s(self) -> float:
         """Time for which the force stays at its start [s]."""
-        return self.hold.value
+        points = zip(self.times_s, self.forces_n, strict=True)
+        return max(time for time, _ in takewhile(lambda point: point[1] == self.forces_n[0], points))
 
     @property
     def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -29,10 +29,9 @@ Unit = Annotated[str, AfterValidator(_known)]
 
 
 class Source(Frozen):
-    """Source of a fact."""
+    """Source of a fact; a fact that is `assumed` has none, and is treated as a parameter."""
 
     tag: Tag
-    """Trust in the fact; one that is `assumed` has no source and is treated as a parameter."""
     reference: str
     """Document, file, or reason of an assumption."""
 
@@ -44,7 +43,6 @@ class Quantity(Frozen):
     """The number as the source states it: a flat surface has an infinite radius."""
     unit: Unit
     source: Source
-    """Source of the number."""
 
     def to(self, unit: str) -> float:
         """Return the number in `unit`; raises UsageError when the dimensions differ."""
@@ -61,7 +59,7 @@ def _measuring(unit: str) -> AfterValidator:
         try:
             given.to(unit)
         except UsageError as error:
-            raise ValueError(f"{error.message} A quantity in {unit}, or a unit like it, is needed.") from error
+            raise ValueError(error.message) from error
         return given
 
     return AfterValidator(checked)

@@ -30,19 +30,19 @@ class PlanEntry(Frozen):
     included: bool
     reason: str
     change: float | None = Field(default=None, allow_inf_nan=True)
-    """Change of an observed channel if the effect is left out: an upper bound for one that is left out (0: exactly
-    nothing), an estimate for an included one. None: not known without computing it."""
+    """Change of an observed channel if the effect is left out: an upper bound for one that is left out, an estimate for
+    an included one. None: not known without computing it."""
     unit: str = "count"
     """Unit of `change`."""
     asked: bool = False
-    """Whether the scene includes it or leaves it out by name."""
+    """Whether the scene names it."""
 
 
 class ClockSegment(Frozen):
     """A line between two clocks: host = device + offset + drift (device - middle), with the epochs of both."""
 
     run: int = 0
-    """Number of the run, from 0; within a run the device's times neither go back nor leap by more than 15 s."""
+    """Number of the run, from 0; within a run the device's times neither go back nor jump by more than 15 s."""
     middle_ns: int
     """Time of the device in the middle of the stretch that the line was fitted to."""
     offset_ns: int
@@ -50,8 +50,8 @@ class ClockSegment(Frozen):
     drift: float
     """Rate by which the host's clock runs faster than the device's [s/s]."""
     bound_ns: int | None
-    """Bound of the line's error within its stretch, if delays sometimes come near their least value (two-way: whatever
-    the delays are), without the constant part of the delay. None: too few points."""
+    """Bound of the line's error within its stretch, without the constant part of the delay, if delays sometimes come
+    near their least value (two-way: for any delays). None: too few points."""
     points: int
     """Number of pairs of times that the line was fitted to; samples that came together count once."""
 
@@ -60,19 +60,18 @@ class StreamClock(Frozen):
     """Origin of the times of one stream."""
 
     source: Literal["device", "host", "simulated"]
-    """`device`: the device's clock, put on the host's by `segments`. `host`: the host's, when the sample came or was
+    """`device`: the device's clock, mapped to the host's by `segments`. `host`: when the sample was received or
     requested. `simulated`: the virtual time of emulated devices."""
     method: Literal["none", "hull-1way", "hull-2way"] = "none"
-    """Method by which the device's clock was put on the host's."""
+    """Method by which the device's clock was mapped to the host's."""
     delay_ns: tuple[int, int] = (0, 0)
-    """Range of the least delay of a sample on its way to the host; one-way fits cannot measure it, and do not remove
-    it."""
+    """Range of the least delay of a sample to the host, which one-way fits neither measure nor remove."""
     segments: tuple[ClockSegment, ...] = ()
-    """Lines in order; between the middles of two in one run, one passes over into the other."""
+    """Lines in order; between the middles of two in one run, one is blended into the other."""
     wraps: int = 0
     """Number of times that the device's counter began anew."""
     breaks: int = 0
-    """Number of times that the count was lost, so that the device's time went back."""
+    """Number of times that the count was lost and the device's time went back."""
 
 
 class StreamCounts(Frozen):
@@ -121,8 +120,7 @@ class RecordingMeta(Frozen):
     emulation: Emulation | None = None
     """How devices were emulated, in which case `simulated` is true; None: no device was."""
     clock: Literal["device", "host", "simulated", "nominal", "none"] = "device"
-    """Origin of the times: the device, the host that read it, the simulation, row number by nominal rate, or none,
-    where only the order of rows is known."""
+    """Origin of the times: the device, the host that read it, the simulation, row number by nominal rate, or none."""
     clocks: dict[str, StreamClock] = Field(default_factory=dict)
     """Clocks of streams with a clock of their own; their `t_ns` are on the host's clock."""
     streams: dict[str, StreamCounts] = Field(default_factory=dict)
@@ -139,7 +137,7 @@ class RecordingMeta(Frozen):
     """Sentences that are shown with every score from the recording."""
     plan: tuple[PlanEntry, ...] = ()
     assumptions: dict[str, Scalar] = Field(default_factory=dict)
-    """Assumed parameters that decide the result; they are shown with every simulated row."""
+    """Assumed parameters that decide the result, shown with every simulated row."""
     drawn: dict[str, Scalar] = Field(default_factory=dict)
     """Numbers that the rig drew or achieved: placement, error bound of the load table …"""
     seed: int | None = None

@@ -1,36 +1,51 @@
-"""Descriptors: what a plugin brings, with the place of its code, so that listing loads none of it."""
+"""Descriptors of sensors, rigs and tasks with the places of their code, which a listing does not import."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from tactbench.core.spec.parameter import Parameter, values_of
-from tactbench.core.spec.quantity import Frozen, Quantity
+from tactbench.core.errors import UsageError
+from tactbench.core.spec.quantity import Frozen, Quantity, Unit
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import WHERE, TaskSpec
+from tactbench.core.spec.task import WHERE, Summary, TaskSpec
 
 _NAME = r"^[a-z][a-z0-9_-]*$"
 EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
 class ManualFrame(Frozen):
-    """A frame of a byte stream, copied from the maker's manual.
-
-    A mistake that a driver and an emulator of one author share, as a byte order, shows against it alone.
-    """
+    """A frame of a byte stream from the maker's manual, which shows a mistake that driver and emulator share."""
 
     data: str = Field(pattern=r"^([0-9A-Fa-f]{2}\s*)+$")
-    """In hexadecimal."""
+    """Bytes of the frame in hexadecimal."""
     readings: dict[str, float] = Field(min_length=1)
-    """What the manual says it holds: channel -> reading, in the channel's unit."""
+    """Readings that the manual states for the frame, by channel, in the channel's unit."""
 
 
-class SensorDescriptor(Frozen):
+class _Named(Frozen):
+    name: str = Field(pattern=_NAME)
+    title: str
+
+
+class _Emulated(Frozen):
+    emulator: str | None = Field(default=None, pattern=WHERE)
+    """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
+    :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
+    emulated_link: EmulatedLink | None = None
+    """Kind of link that the driver uses; needed where there is an emulator."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """Options of the driver that only the papers of a real device state, with their values for the emulated device.
+    They hold where a rig file leaves them out."""
+    manual_frame: ManualFrame | None = None
+    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
+
+
+class SensorDescriptor(_Emulated):
     """A sensor, and the places of its code."""
 
     spec: SensorSpec
@@ -38,19 +53,8 @@ class SensorDescriptor(Frozen):
     """``module:callable`` -> :class:`tactbench.plugin.simulation.Transducer`; needed on the twin only."""
     driver: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; for real devices."""
-    emulator: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
-    :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
-    emulated_link: EmulatedLink | None = None
-    """Kind of link that the driver uses; needed where there is an emulator."""
     log_reader: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
-    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """Options of the driver that only the papers of a real device state, with their values for the emulated device.
-    They hold where a rig file leaves them out."""
-    manual_frame: ManualFrame | None = None
-    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
-
     effects: tuple[str, ...] = ()
     """Names of effects of other packages, or of the sensor's own, that are candidates wherever it is simulated."""
 
@@ -60,28 +64,18 @@ class SensorDescriptor(Frozen):
         return self.spec.name
 
 
-class DeviceDescriptor(Frozen):
+class DeviceDescriptor(_Emulated, _Named):
     """A device other than a tactile sensor, such as a force sensor or a motor, and the places of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     kind: Literal["force", "motor"]
     """Use of the device in a rig. The streams of a force sensor have channels of kind `force`."""
     driver: str = Field(pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; of a motor, what its
     rig expects."""
-    emulator: str | None = Field(default=None, pattern=WHERE)
-    """The same as of a sensor."""
-    emulated_link: EmulatedLink | None = None
-    """The same as of a sensor."""
-    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """The same as of a sensor."""
-    manual_frame: ManualFrame | None = None
-    """The same as of a sensor."""
 
 
 class TaskDescriptor(Frozen):
-    """A task, which is described by its spec alone."""
+    """A task, which its spec describes completely."""
 
     spec: TaskSpec
 
@@ -91,11 +85,9 @@ class TaskDescriptor(Frozen):
         return self.spec.name
 
 
-class RigDescriptor(Frozen):
+class RigDescriptor(_Named):
     """A rig, and the places of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
@@ -103,33 +95,30 @@ class RigDescriptor(Frozen):
     replays: bool = False
     """Whether it is a ReplayRig; one of these is used for ``--recordings`` without ``--rig``."""
     references: dict[str, tuple[str, ...]] | None = None
-    """Kinds of channels that its reference records, each with their names where they are fixed. A task that needs
-    others is refused before anything is recorded. None: they are not known beforehand."""
+    """Kinds of channels of its reference, each with their names where these are fixed, which are compared with a task's
+    needs before recording; None: they are not known beforehand."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of a simulated rig's ladder of solvers, the cheapest first."""
     verification: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called without arguments: Verdicts of the simulation against laws and closed forms."""
     work_precision: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
-    CostStudy of error against seconds per recording."""
+    """``module:callable``, called with a SensorDescriptor and ``rounds=``, a number of timed recordings: a CostStudy
+    of error against seconds per recording."""
     file: str | None = Field(default=None, pattern=WHERE)
-    """``module:class``, a RigFile that also checks the rig's own settings: complaints about them then name their
-    line."""
+    """``module:class``, a RigFile that also checks the rig's own settings, so that complaints name their line."""
     check: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a RigFile: a RigCheck of what the rig would do, with nothing opened or moved."""
     emulators: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with a RigFile and a registry: RigEmulators, whose motors move and forces answer, for
-    real time. None: devices sense what a simulated rig has recorded."""
+    """``module:callable``, called with a RigFile and a registry: RigEmulators with moving motors, for real time. None:
+    emulated devices read the samples of a simulated rig."""
 
 
-class EstimatorDescriptor(Frozen):
+class EstimatorDescriptor(_Named):
     """An estimator, and the place of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     kinds: tuple[Literal["regression", "classification", "events"], ...]
-    """Kinds of tasks that it answers. For `events`, ``fit`` is given 0 or 1 for each frame (whether it slips) and
-    ``predict`` returns a score for each: an alarm needs one at or above a threshold."""
+    """Kinds of tasks that it answers. For `events`, ``fit`` takes 0 or 1 for each frame (whether it slips) and
+    ``predict`` returns a score for each, which raises an alarm at or above a threshold."""
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
@@ -140,14 +129,14 @@ class EstimatorDescriptor(Frozen):
     window_grid: tuple[int, ...] = (0,)
     """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
     looks_at: Literal["features", "time", "nothing", "reference"] = "features"
-    """`time`: X is the time index alone. `nothing`: X is a column of zeros. `reference`, of events alone: X is the
-    tangential force over friction times normal force, from the reference sensor: an oracle."""
+    """`time`: X is the time index. `nothing`: X is a column of zeros. `reference`, for events only: X is the tangential
+    force over friction times normal force, from the reference sensor: an oracle."""
     summaries: tuple[Summary, ...] = ()
     """Numbers of each channel that it uses for frames, in place of the task's own."""
     frames_by: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable`` for features of frames in place of summaries, called with (one stream, a
-    :class:`tactbench.plugin.StreamReadings`; (n,) ends of frames [s]; length of a frame [s]): (n, features) numbers of
-    the samples up to each end, NaN where there is no answer. Only the fastest stream is passed."""
+    """``module:callable`` for features of frames in place of summaries, called with (the fastest stream as
+    :class:`tactbench.plugin.StreamReadings`, (n,) ends of frames [s], length of a frame [s]): (n, features) numbers of
+    the samples up to each end, NaN where there is no answer."""
     threshold: float | None = None
     """Threshold of its own for events; None: it is chosen on validation recordings."""
     baseline: bool = False
@@ -157,23 +146,19 @@ class EstimatorDescriptor(Frozen):
     distributions: tuple[str, ...] = ()
     """Distributions beside tactbench that compute its answers; the key of a cell covers their versions."""
     rehearsal: dict[str, Any] | None = None
-    """Parameters with which it fits a few rows at once and leaves no thread behind. It then does so before cells are
-    timed, so that the first use of its library is in no time. None: it is only built."""
+    """Parameters of a short fit before cells are timed, so that no time contains the first use of its library; None: it
+    is only built."""
 
     @model_validator(mode="after")
     def _nothing_is_searched_of_detectors(self) -> EstimatorDescriptor:
         if "events" in self.kinds and (self.grid or self.window_grid != (0,)):
-            raise ValueError(
-                "kind events chooses a threshold on validation recordings, and neither grid nor window_grid"
-            )
+            raise ValueError("kind events has neither grid nor window_grid: only its threshold is chosen")
         return self
 
 
-class EffectDescriptor(Frozen):
+class EffectDescriptor(_Named):
     """A physical influence that a simulation may include."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``; imported only when a plan includes the effect."""
     produces: tuple[str, ...] = ()
@@ -184,34 +169,85 @@ class EffectDescriptor(Frozen):
     """Names of groups of effects in a scene's ``simulation.effects``: ``drift``, ``noise``."""
 
 
-class IndenterDescriptor(Frozen):
+class Parameter(Frozen):
+    """A parameter of a shape or of a force profile."""
+
+    default: float
+    """Value that is taken where a scene gives none, in `unit`."""
+    unit: Unit
+    """Unit in which the plugin's code receives the value."""
+    text: str = Field(pattern=r"^\S[^\n]*$")
+    """Description in one line."""
+    least: float = 0.0
+    """Smallest value that may be given, in `unit`."""
+    most: float | None = None
+    """Largest value that may be given, in `unit`; None: there is no such limit."""
+
+    @model_validator(mode="after")
+    def _default_may_be_given(self) -> Parameter:
+        if not self.allows(self.default):
+            raise ValueError(f"default: {self.default:g} is given, and {self.range} is expected")
+        return self
+
+    def allows(self, value: float) -> bool:
+        """Return whether `value`, in `unit`, may be given."""
+        return math.isfinite(value) and self.least <= value and (self.most is None or value <= self.most)
+
+    @property
+    def range(self) -> str:
+        """The range of values in words: ``0.5 to 3 mm``."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        upper = "" if self.most is None else f" to {self.most:g}"
+        return f"{self.least:g}{upper}{unit}{'' if upper else ' or more'}"
+
+
+def _values(what: str, parameters: Mapping[str, Parameter], given: Mapping[str, Quantity]) -> dict[str, float]:
+    """Return the value of each of `parameters` in its own unit: `given`, or its default.
+
+    Raises UsageError, which begins with `what` (``The indenter 'pin'``), for a name that is not among `parameters`, a
+    unit of another dimension, or a value out of range.
+    """
+    for name in sorted(given.keys() - parameters.keys()):
+        known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
+        raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")
+    values = {}
+    for name, parameter in parameters.items():
+        try:
+            value = given[name].to(parameter.unit) if name in given else parameter.default
+        except UsageError as error:
+            raise UsageError(f"{what}: {name}: {error.message}", hint=f"It is: {parameter.text}") from error
+        if not parameter.allows(value):
+            raise UsageError(
+                f"{what}: {name} is given as {given[name]}, and {parameter.range} is expected.",
+                hint=f"It is: {parameter.text}",
+            )
+        values[name] = value
+    return values
+
+
+class IndenterDescriptor(_Named):
     """A shape of an indenter, and the place of the code for its height."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(x_mm, y_mm, **dimensions)`` with two arrays that broadcast: the height
-    of the body above its lowest point [mm], finite everywhere and 0 at (0, 0). Where a flank is vertical, or there is
-    no body, it is large: 50 mm or more."""
+    of the body above its lowest point [mm], finite everywhere, 0 at (0, 0), 50 mm or more where there is no body."""
     dimensions: dict[str, Parameter] = Field(default_factory=dict)
     """Parameters, each passed as a keyword in its own unit."""
 
     @model_validator(mode="after")
     def _angle_is_the_scenes(self) -> IndenterDescriptor:
         if "angle" in self.dimensions:
-            raise ValueError("dimensions: angle is how a scene turns the shape; call it something else")
+            raise ValueError("dimensions: a scene turns the shape by `angle`; rename this one")
         return self
 
     def sizes(self, given: Mapping[str, Quantity]) -> dict[str, float]:
-        """Return every dimension, each in its unit: as `given`, or by default; raises UsageError naming one."""
-        return values_of(f"The indenter {self.name!r}", self.dimensions, given)
+        """Return every dimension in its unit: as `given`, or its default; raises UsageError for a wrong one."""
+        return _values(f"The indenter {self.name!r}", self.dimensions, given)
 
 
-class ProfileDescriptor(Frozen):
+class ProfileDescriptor(_Named):
     """A named profile of the normal force, and the place of its code."""
 
-    name: str = Field(pattern=_NAME)
-    title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. A scene, and
     with it a recording, holds this path and not the profile's name."""
@@ -219,5 +255,5 @@ class ProfileDescriptor(Frozen):
     """Parameters, each passed as a keyword in its own unit."""
 
     def values(self, given: Mapping[str, Quantity]) -> dict[str, float]:
-        """Return every parameter, each in its unit: as `given`, or by default; raises UsageError naming one."""
-        return values_of(f"The profile {self.name!r}", self.parameters, given)
+        """Return every parameter in its unit: as `given`, or its default; raises UsageError for a wrong one."""
+        return _values(f"The profile {self.name!r}", self.parameters, given)

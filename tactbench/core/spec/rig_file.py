@@ -36,22 +36,26 @@ class DeviceEntry(Frozen):
     @model_validator(mode="after")
     def _faults_of_emulators(self) -> DeviceEntry:
         if self.faults and not self.emulated:
-            raise ValueError("only an emulated device has faults to choose; use link: emulated, or leave them out")
+            raise ValueError("only an emulated device (link: emulated) has faults")
         return self
 
 
-class ForceEntry(DeviceEntry):
-    """The reference force sensor."""
+class NamedDevice(DeviceEntry):
+    """A device other than the sensor, such as a motor."""
 
     device: str
     """Name of the device (``tactbench list devices``)."""
+
+
+class ForceEntry(NamedDevice):
+    """The reference force sensor."""
+
     channel: str = "fz"
     """Channel along which the sensor is pressed."""
     sign: Literal[-1, 1] = 1
     """Sign of the change of that channel when the sensor is pressed."""
     zero_s: float = Field(default=2.0, ge=0)
-    """Seconds without load before each scene, whose mean becomes zero on every channel; 0: the device's own zero is
-    kept."""
+    """Seconds without load before each scene, whose mean is zero on every channel; 0: the device's zero is kept."""
     range_n: float = Field(default=25.0, gt=0)
     """Rated range of its forces [N], by default that of a Nano17 SI-25-0.25. While the zero is taken, a mean above a
     tenth of it is refused, and so are a spread above a twentieth and a drift above a hundredth."""
@@ -70,15 +74,7 @@ class Allowed(Frozen):
     """Largest share of the rows of a stream that never came, or were dropped because writing was behind [%]."""
     frozen_s: float = Field(default=2.0, gt=0)
     """Longest time in which no channel of the force sensor changes, though most of its other rows differ from the one
-    before, or none of the sensor while the force does. A force that never changes while the sensor does is frozen
-    too."""
-
-
-class NamedDevice(DeviceEntry):
-    """A further device, such as a motor."""
-
-    device: str
-    """Name of the device (``tactbench list devices``)."""
+    before, or none of the sensor while the force does; also a force that never changes while the sensor does."""
 
 
 class EmulationSettings(Frozen):
@@ -87,10 +83,9 @@ class EmulationSettings(Frozen):
     physics: str = ""
     """Name of the simulated rig whose samples the devices read; empty: the one that comes with tactbench."""
     seed: int = Field(default=1, ge=0)
-    """Seed of what emulators draw; a run has a seed of its own for the scene."""
+    """Seed of the emulators; the scene has that of the run."""
     control: str = ""
-    """Address ``host:port`` of emulators that run already, to which each scene is sent; `tactbench emulate` writes
-    it."""
+    """Address ``host:port`` of running emulators, to which each scene is sent; `tactbench emulate` writes it."""
 
 
 class RigFile(Frozen):

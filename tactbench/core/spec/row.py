@@ -7,12 +7,16 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict
 
-from tactbench.core.spec.status import Status
+Status = Literal["done", "failed", "crashed", "timeout", "out-of-memory", "skipped"]
+STATUSES: tuple[Status, ...] = get_args(Status)
+"""Statuses of a cell: every planned cell ends as one row with one of them."""
+STOPPED: frozenset[Status] = frozenset({"failed", "crashed", "timeout", "out-of-memory"})
+"""Statuses of cells that failed; one of them makes the exit code 1."""
 
 TRUE = "true_"
 """Prefix of the names of metrics against the force that a simulated rig exerted."""
 DIRECTIONS = (" (lower is better)", " (higher is better)")
-"""Suffixes of the name of a caller's own metric: a row tells all that a table needs."""
+"""Suffixes of the name of a caller's own metric."""
 
 
 def lower_is_better(metric: str) -> bool:
@@ -22,10 +26,10 @@ def lower_is_better(metric: str) -> bool:
 
 
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
-"""Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
+"""Keys of `scores` beside the mean error of a vector: percentiles over the test rows."""
 
 LEAKS = "leaks: "
-"""Prefix of stamps on a score that is no measure of the sensor."""
+"""Prefix of stamps on a score that training data have leaked into."""
 
 
 def plural(unit: str) -> str:
@@ -176,11 +180,9 @@ class Evaluated(RestsOn, Cost, Scored):
 
 
 class RowModel(Evaluated, Ended, Asked):
-    """The row of one cell. Times are seconds unless the name has another unit; other keys than these may stand in it.
+    """The keys of the row of one cell, with their types and defaults, in the order of tables for programs.
 
-    Rows are handed about as plain mappings; this model says what they hold and what stands there before anything is
-    known. Tables for programs have its keys in this order: the last base first. Each row has dictionaries and lists of
-    its own: pydantic copies empty defaults.
+    Rows are plain mappings, and may have other keys. Times are seconds unless the name has another unit.
     """
 
 
@@ -204,14 +206,11 @@ class ReplicatedRow(RowModel):
     """the same for each replicate"""
 
 
-def _members(annotation: Any) -> list[Any]:
-    """Return the members of a union; of anything else, itself."""
-    is_union = get_origin(annotation) not in (None, list, dict, Literal)
-    return list(get_args(annotation)) if is_union else [annotation]
-
-
 def _types(annotation: Any) -> frozenset[type]:
-    found = {str if get_origin(one) is Literal else get_origin(one) or one for one in _members(annotation)}
+    """Return the types of the members of a union, or of another annotation; a float may be an int."""
+    is_union = get_origin(annotation) not in (None, list, dict, Literal)
+    members = get_args(annotation) if is_union else (annotation,)
+    found = {str if get_origin(one) is Literal else get_origin(one) or one for one in members}
     return frozenset(found | {int} if float in found else found)
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
@@ -23,8 +22,6 @@ from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
 from tactbench.core.spec.quantity import Frozen, Quantity, assumed, measured, sourced
 from tactbench.core.spec.sensor import ChannelKind, ranges
 
-M = TypeVar("M", bound=BaseModel)
-
 Role = Literal["train", "validation", "test"]
 """Role of a recording in a task."""
 
@@ -35,10 +32,10 @@ class Indenter(Frozen):
     radius: Quantity | None = None
     """Radius of the cap [length]; None: the surface is flat or of another shape."""
     shape: str | None = None
-    """Name of an installed shape (``tactbench list indenters``); None: a cap if there is a radius, else flat. ``cap``
-    and ``flat`` may be written, and are read as these."""
+    """Name of an installed shape (``tactbench list indenters``); None, ``cap``, ``flat``: a cap if there is a radius,
+    else flat."""
     dimensions: dict[str, Quantity] = Field(default_factory=dict)
-    """Dimensions of the shape by name; one that is left out has its default."""
+    """Dimensions of the shape by name; the others have their defaults."""
     angle: Quantity = assumed(0.0, "deg", "the shape's own axes are those of the sensor")
     """Rotation of the shape about the press axis, from x towards s [angle]."""
 
@@ -58,17 +55,16 @@ class Indenter(Frozen):
     @model_validator(mode="after")
     def _is_one_body(self) -> Indenter:
         if self.shape is not None and self.radius is not None:
-            raise ValueError(f"radius: it is that of a cap; give the dimensions of {self.shape!r} under dimensions")
+            raise ValueError(f"radius: only a cap has one; give the dimensions of {self.shape!r} under dimensions")
         if self.shape is None and self.dimensions:
-            body = "a flat surface" if self.radius is None else "a cap"
-            raise ValueError(f"dimensions: {body} has none of {', '.join(self.dimensions)}; name a shape")
+            raise ValueError(f"dimensions: {self} has none of {', '.join(self.dimensions)}; name a shape")
         if self.angle.to("rad") and self.shape is None:
-            raise ValueError(f"angle: {self.angle} is given; a cap and a flat surface are the same from all sides")
+            raise ValueError(f"angle: {self.angle} is given, and {self} is the same from all sides")
         return self
 
     @model_serializer(mode="wrap")
     def _as_ever(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the stored form, in which caps and flat surfaces have a radius alone, as before there were shapes."""
+        """Return the stored form: caps and flat surfaces have a radius only, as in earlier recordings."""
         stored: dict[str, Any] = serialize(self)
         return stored if self.shape is not None else {"radius": stored["radius"]}
 
@@ -109,8 +105,7 @@ class Environment(Frozen):
     )
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
-    """Factor on the white noise of the sensor; docs/calibration.md has the factors that agree with the paper's
-    figures."""
+    """Factor on the white noise of the sensor; docs/calibration.md has those that agree with the paper's figures."""
     drift_scale: float = Field(default=1.0, ge=0)
     """Factor on wander and warm-up, and on offsets where these have no factor of their own."""
     offset_scale: float | None = Field(default=None, ge=0)
@@ -127,7 +122,7 @@ class Environment(Frozen):
     """Temperature of the room [degC]."""
     indenter_temperature: Quantity | None = None
     """Temperature of the indenter [degC]; None: that of the surface which it touches, so that no heat flows. No source
-    states it: a cap that lies in the room has the temperature of the room."""
+    states it; a cap may have the temperature of the room."""
 
     @property
     def scale_of_offsets(self) -> float:
@@ -145,8 +140,7 @@ class Surface(Frozen):
     kinetic_friction: Quantity = assumed(0.65, "1", "a sixth below the static coefficient; no source for this skin")
     """Ratio of tangential to normal force at speeds far above `stribeck_speed` [1]."""
     stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
-    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb's two
-    coefficients)."""
+    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb)."""
     roughness: Quantity = measured(
         73.0,
         "um",
@@ -200,9 +194,9 @@ class Slide(Frozen):
     @model_validator(mode="after")
     def _moves(self) -> Slide:
         if not self.speed.to("mm/s") > 0 or self.start.to("s") < 0:
-            raise ValueError("a slide has a speed above 0 and starts at 0 s or later; leave it out for none")
+            raise ValueError("a slide has a speed above 0 and starts at 0 s or later")
         if self.duration is not None and not self.duration.to("s") > 0:
-            raise ValueError("a slide lasts longer than 0 s; leave the duration out for the rest of the recording")
+            raise ValueError("a slide lasts longer than 0 s")
         self.direction.to("rad")
         return self
 
@@ -219,20 +213,18 @@ class Simulation(Frozen):
     """Settings of a simulated rig for a scene; a real rig ignores them."""
 
     effects: tuple[Annotated[str, Field(pattern=r"^[+-]?[a-z][a-z0-9-]*$")], ...] = ()
-    """Words about effects, of which later ones win: ``+name`` includes an effect (or a group of them) always, ``-name``
-    leaves it out, with ``name`` the plan decides. ``+all`` and ``-all`` are all candidates. An effect of another
-    package is a candidate only where it is named here or by the sensor."""
+    """Choice of effects, of which later ones win: ``+name`` always includes an effect or a group, ``-name`` leaves it
+    out, with ``name`` the plan decides. ``+all`` and ``-all`` are all candidates. An effect of another package is a
+    candidate only where it is named here or by the sensor."""
     rung: str | None = None
     """Name of a rung of the ladder of solvers; None: the default one."""
     tolerance: float | None = Field(default=None, gt=0)
-    """Largest error of an observed channel, in its own unit, by which the cheapest rung is chosen. None: that of the
-    rung."""
+    """Largest error of an observed channel, in its unit, which chooses the cheapest rung; None: that of the rung."""
     scenario: str | None = None
     """Name of a scenario of the sensor, whose nuisances replace the usual ones; None: the usual ones hold."""
 
     nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
-    """Values that replace those of the scene or the sensor, by the name of the nuisance: ``placement_scatter_mm:
-    0.3``."""
+    """Values of nuisances in place of the scene's or the sensor's, by name: ``placement_scatter_mm: 0.3``."""
 
     @field_serializer("nuisances")
     def _as_mapping(self, nuisances: tuple[tuple[str, float], ...]) -> dict[str, float]:
@@ -246,7 +238,7 @@ class Simulation(Frozen):
 
 
 class Scene(Frozen):
-    """All that is present and commanded in one recording."""
+    """The bodies, motions and settings of one recording."""
 
     name: str
     """Name, short and unique within a task, and fit for a file name."""
@@ -254,7 +246,7 @@ class Scene(Frozen):
     placement: Placement = Placement()
     profile: ForceProfile = ForceRamp()
     drive: ForceLoop | None = None
-    """Force loop that brings the force about; None: the indenter follows the profile exactly."""
+    """Force loop that drives the indenter; None: the force follows the profile exactly."""
     slide: Slide | None = None
     """Tangential motion; None: the indenter is pressed only."""
     environment: Environment = Environment()
@@ -287,52 +279,38 @@ class Scene(Frozen):
         return found
 
     def with_nuisances(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with other `values` of nuisances, by name; names of other parts than a scene's are ignored.
+        """Return the scene with other `values` of its nuisances, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If a nuisance cannot have its value, or the scene lacks the part that it is of.
+        Raises UsageError if a nuisance cannot have its value, or the scene has no such part.
         """
-        by_part: dict[tuple[str, ...], dict[str, float]] = {}
-        for name, value in values.items():
-            if name in NUISANCES:
-                if value < 0 and name not in _MAY_BE_NEGATIVE:
-                    raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
-                by_part.setdefault(NUISANCES[name][0][:-1], {})[name] = value
-        scene = self
-        for way, given in by_part.items():
-            scene = _with(scene, way, given)
-        return scene
+        given = {name: value for name, value in values.items() if name in NUISANCES}
+        data = self.model_dump()
+        for name, value in given.items():
+            if value < 0 and name not in _MAY_BE_NEGATIVE:
+                raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
+            (*parts, field), unit = NUISANCES[name]
+            inside = data
+            for part in parts:
+                if inside[part] is None:
+                    raise UsageError(f"{name}: the scene has no {part}.", hint="Leave it out.")
+                inside = inside[part]
+            is_quantity = isinstance(inside[field], Mapping) or field in _UNITS
+            inside[field] = assumed(value, unit, "set for this run") if is_quantity else value
+        try:
+            return Scene.model_validate(data) if given else self
+        except ValidationError as error:
+            listed = ", ".join(f"{name} = {value:g}" for name, value in given.items())
+            raise UsageError(f"{listed}: {complaint(error)}.", hint="Give another value.") from error
 
     def simulated_as(self, simulation: Simulation) -> Scene:
         """Return the scene with other settings of a simulated rig; raises the errors of `with_nuisances`.
 
-        The scene's own words about effects stand before those of `simulation`.
+        The scene's own entries of effects stand before those of `simulation`.
         """
         if simulation == Simulation():
             return self
         every = simulation.model_copy(update={"effects": (*self.simulation.effects, *simulation.effects)})
         return self.with_nuisances(dict(simulation.nuisances)).model_copy(update={"simulation": every})
-
-
-def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
-    """Return a copy of `model` with nuisances of the part at `way`; raises UsageError for a value that is not valid."""
-    if way:
-        inside = getattr(model, way[0])
-        if inside is None:
-            raise UsageError(f"{', '.join(given)}: the scene has no {way[0]}.", hint="Leave it out.")
-        return model.model_copy(update={way[0]: _with(inside, way[1:], given)})
-    change: dict[str, Quantity | float] = {}
-    for name, value in given.items():
-        path, unit = NUISANCES[name]
-        is_quantity = "Quantity" in str(type(model).model_fields[path[-1]].annotation)
-        change[path[-1]] = assumed(value, unit, "set for this run") if is_quantity else value
-    try:
-        return type(model).model_validate({**dict(model), **change})
-    except ValidationError as error:
-        listed = ", ".join(f"{name} = {value:g}" for name, value in given.items())
-        raise UsageError(f"{listed}: {complaint(error)}.", hint="Give another value.") from error
 
 
 _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (
@@ -357,9 +335,9 @@ def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
 
 
 NUISANCES: Mapping[str, tuple[tuple[str, ...], str]] = dict(_nuisances())
-"""Numbers of a scene that no source states well enough, by name, with their place in the scene and their unit.
+"""Numbers of a scene that sources do not state well enough, by name, with their place in the scene and their unit.
 
-The name is field and unit, behind the part of the scene where that is not the environment: ``since_power_on_s``,
+The name is part of the scene (except the environment), field and unit: ``since_power_on_s``,
 ``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
 """
 

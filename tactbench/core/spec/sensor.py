@@ -61,13 +61,13 @@ class ChannelSpec(Frozen):
     sign: Literal[-1, 0, 1] = 0
     """Sign of the response: +1 if the reading rises under load, -1 if it falls, 0 if it does either or is not known."""
     position_m: Vector | None = None
-    """Place (x, y, z) on the sensor [m], in the sensor's frame: x along the finger towards the tip, y across, -z to the
-    pad that is pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
+    """Place (x, y, z) in the sensor's frame [m]: x along the finger towards the tip, y across, -z to the pad that is
+    pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
     normal: Vector | None = None
     """Outward unit normal at that place."""
     site: str | None = Field(default=None, min_length=1)
-    """Name of the place where several channels share it, as the axes of one magnet do; they state one position and
-    normal. None: the channel has a place of its own."""
+    """Name of the place of several channels, as the axes of one magnet, which state one position and normal; None: the
+    channel has a place of its own."""
     position_source: Source | None = None
     """Source of position and normal."""
     scale: Quantity | None = None
@@ -91,7 +91,7 @@ class StreamSpec(Frozen):
 
 
 class Creep(Frozen):
-    """An exponential term with which the response lags behind the load."""
+    """An exponential term of the lag of the response behind the load."""
 
     fraction: Share
     """Share of the response that arrives late [1]."""
@@ -99,19 +99,15 @@ class Creep(Frozen):
     """Its time constant [time]."""
 
 
-_NONE_STATED = "the sensor states none"
-_NO_COUNTS = assumed(0.0, "count", _NONE_STATED)
-_NO_SHARE = assumed(0.0, "1", _NONE_STATED)
+_NO_COUNTS, _NO_SHARE = (assumed(0.0, unit, "the sensor states none") for unit in ("count", "1"))
 _ANY_TIME = assumed(1.0, "s", "without effect")
 
 
 class Nuisances(Frozen):
     """Noise, drift and scatter of all channels of one kind, which a simulation adds to the physics.
 
-    Amounts are in the channel's own unit, ``count`` for raw readings, and added to readings as they are. Shares are in
-    1, time constants in a time.
-
-    What is left out is 0; a warm-up or a wander needs its time constant.
+    Amounts are in the channel's own unit, ``count`` for raw readings. An amount that is left out is 0; a warm-up or a
+    wander needs its time constant.
     """
 
     white: Quantity = _NO_COUNTS
@@ -158,45 +154,32 @@ class Nuisances(Frozen):
     def _has_its_time_constants(self) -> Nuisances:
         for name in ("warm_up", "wander"):
             if getattr(self, name).value and f"{name}_tau" not in self.model_fields_set:
-                raise ValueError(f"{name} is not 0, so {name}_tau is needed, the time constant of it")
+                raise ValueError(f"{name} is not 0, so {name}_tau is needed")
         return self
 
     def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
         """Return every amount with its field, by its name in settings of a run: ``taxel_white_count``."""
-        stated = {field: getattr(self, field) for field in type(self).model_fields if field != "creep"}
+        stated = {field: one for field, one in self if isinstance(one, Quantity)}
         for place, term in enumerate(self.creep, start=1):
             stated |= {f"creep_{place}_fraction": term.fraction, f"creep_{place}_tau": term.tau}
-        return {
-            units.with_unit(f"{kind}_{field}", one.unit): (field, one)
-            for field, one in stated.items()
-            if one is not None
-        }
+        return {units.with_unit(f"{kind}_{field}", one.unit): (field, one) for field, one in stated.items()}
 
     def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
-        """Return these nuisances with other `values`, by name; names of others are ignored.
+        """Return these nuisances with other `values`, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If an amount cannot have its value.
+        Raises UsageError if an amount cannot have its value.
         """
         known = self.by_name(kind)
-        given = {field: getattr(self, field) for field in self.model_fields_set}
-        creep = [term.model_dump() for term in self.creep]
-        for name, value in values.items():
-            if name not in known:
-                continue
-            field, old = known[name]
+        data = self.model_dump(exclude_unset=True)
+        for name in values.keys() & known.keys():
+            (field, old), value = known[name], values[name]
             if value < 0 and field != "warm_up":
                 raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
-            new = assumed(value, old.unit, "set for this run")
-            if field.startswith("creep_"):
-                _, place, part = field.split("_")
-                creep[int(place) - 1][part] = new
-            else:
-                given[field] = new
+            of, place, part = field.split("_") if field.startswith("creep_") else ("", "1", field)
+            inside = data["creep"][int(place) - 1] if of else data
+            inside[part] = assumed(value, old.unit, "set for this run")
         try:
-            return Nuisances.model_validate({**given, "creep": creep})
+            return Nuisances.model_validate(data)
         except ValidationError as error:
             raise UsageError(f"{kind}: {complaint(error)}.", hint="Set that as well.") from error
 
@@ -241,7 +224,7 @@ class DataSheet(Frozen):
     availability: Statement | None = None
     """Availability of the device."""
     exists: bool = True
-    """Whether there is such a device; a mere definition is left out by `tactbench choose`."""
+    """Whether there is such a device; `tactbench choose` leaves out mere definitions."""
 
     @model_validator(mode="after")
     def _has_its_units(self) -> DataSheet:
@@ -267,7 +250,7 @@ class SensorSpec(Frozen):
     """Skin for simulation; None: the sensor can only be recorded or replayed."""
     reads_shear: tuple[ChannelKind, ...] = ()
     """Kinds of channels whose transducer uses `tangential_displacement_mm` and `shear_mpa` of a SkinState, which are
-    computed only where such a channel is observed."""
+    not computed otherwise."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
     """Parameters of the sensor's own transduction."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
@@ -275,29 +258,22 @@ class SensorSpec(Frozen):
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
     """Ways of handling that the usual nuisances do not cover, by name; a scene's simulation selects one."""
     ranges: dict[str, PhysicalRange] = Field(default_factory=dict, exclude=True)
-    """Ranges of nuisances by their names in settings of a run: of the sensor's own, and of a scene's factors on them.
-    They are left out of recordings and keys, as no sample depends on them."""
+    """Ranges of nuisances, and of a scene's factors on them, by their names in settings of a run. They are left out of
+    recordings and keys, as no sample depends on them."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
     """Facts about the device. They are left out of recordings and keys, as no sample depends on them."""
 
     @model_validator(mode="after")
-    def _names_are_unique(self) -> SensorSpec:
+    def _names_and_places_agree(self) -> SensorSpec:
         for what, several in (("channel", self.channels()), ("stream", self.streams)):
             names = [one.name for one in several]
-            doubled = sorted({name for name in names if names.count(name) > 1})
-            if doubled:
+            if doubled := sorted({name for name in names if names.count(name) > 1}):
                 raise ValueError(f"{what} names must be unique in a sensor; repeated: {', '.join(doubled)}")
-        return self
-
-    @model_validator(mode="after")
-    def _a_site_is_one_place(self) -> SensorSpec:
         for first, *others in self.sites():
             for one in others:
                 if (one.position_m, one.normal) != (first.position_m, first.normal):
-                    raise ValueError(
-                        f"site {one.site}: the place of {one.name} is not that of {first.name}; a site is one place"
-                    )
+                    raise ValueError(f"site {one.site}: {one.name} and {first.name} state different places")
         return self
 
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:
@@ -306,12 +282,10 @@ class SensorSpec(Frozen):
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
 
     def sites(self, *kinds: ChannelKind) -> tuple[tuple[ChannelSpec, ...], ...]:
-        """Return the channels of the given kinds by place: those of a site together, each other one alone."""
-        found: dict[tuple[str, str], list[ChannelSpec]] = {}
-        for channel in self.channels(*kinds):
-            found.setdefault(("channel", channel.name) if channel.site is None else ("site", channel.site), []).append(
-                channel
-            )
+        """Return the channels of the given kinds by place: those of a site together, every other one separately."""
+        found: dict[tuple[str | None, str], list[ChannelSpec]] = {}
+        for one in self.channels(*kinds):
+            found.setdefault((one.site, "" if one.site else one.name), []).append(one)
         return tuple(map(tuple, found.values()))
 
     def settable(self) -> dict[str, Quantity]:
@@ -319,12 +293,9 @@ class SensorSpec(Frozen):
         return {name: amount for kind, own in self.nuisances.items() for name, (_, amount) in own.by_name(kind).items()}
 
     def with_nuisances(self, values: Mapping[str, float]) -> SensorSpec:
-        """Return the spec with other `values` of its nuisances, by name; names of others are ignored.
+        """Return the spec with other `values` of its nuisances, by name; other names are ignored.
 
-        Raises
-        ------
-        UsageError
-            If a nuisance cannot have its value.
+        Raises UsageError if a nuisance cannot have its value.
         """
         if not values.keys() & self.settable().keys():
             return self
@@ -332,13 +303,7 @@ class SensorSpec(Frozen):
         return self.model_copy(update={"nuisances": nuisances})
 
     def handled(self, scenario: str | None) -> SensorSpec:
-        """Return the spec with the nuisances of one of its scenarios, or itself for None.
-
-        Raises
-        ------
-        NotApplicable
-            If the sensor states no scenario of that name.
-        """
+        """Return the spec with the nuisances of a scenario (None: the usual ones); raises NotApplicable if unknown."""
         if scenario is None:
             return self
         if scenario not in self.scenarios:

@@ -1,7 +1,4 @@
-"""Media of a sensor's skin, which a sensor declares and a simulation solves.
-
-A third party's sensor runs on the twin by declaring one of these media. The equations are in ``docs/twin.md``.
-"""
+"""Media of a sensor's skin, which a sensor declares and the twin solves; ``docs/twin.md`` has the equations."""
 
 from __future__ import annotations
 
@@ -20,8 +17,8 @@ if TYPE_CHECKING:
 class Dome(Frozen):
     """The tip of a finger, where its cylinder ends in a hemisphere of the same radius.
 
-    On the sheet a point of the dome keeps its axial coordinate: cylinder and hemisphere then have the sheet's own area
-    everywhere (Archimedes; Lambert's cylindrical projection), so that loads and volumes are the finger's.
+    A point of the dome keeps its axial coordinate on the sheet, which preserves areas (Lambert's cylindrical
+    projection), and so loads and volumes.
     """
 
     start: Length
@@ -31,7 +28,7 @@ class Dome(Frozen):
 class SheetTable(Frozen):
     """A length over the sheet, symmetric about the midline: a film's thickness, or a surface's relief.
 
-    Straight between the entries, and even beyond the outermost: it never leaves the range of its neighbours.
+    It is linear between the entries and constant beyond the outermost.
     """
 
     x_mm: tuple[float, ...]
@@ -142,8 +139,7 @@ class FoamPad(Frozen):
     cover_bending: BendingStiffness
     """Bending stiffness of the cover [force x length]."""
     contact_stiffness: Stiffness
-    """Stiffness with which the cover keeps an indenter out [pressure / length]: a penalty, no property of the
-    material."""
+    """Penalty on an indenter in the cover [pressure / length], not a property of the material."""
 
 
 class BondedLayer(Frozen):
@@ -158,9 +154,8 @@ class BondedLayer(Frozen):
     thickness: Length
     """Thickness of the layer at rest, between surface and base [length]."""
     contact_stiffness: Stiffness
-    """Stiffness with which the surface keeps an indenter out [pressure / length]: a penalty, no property of the
-    material. That of the sensor `ideal` is 60 times its young / thickness; with a soft one, the indenter sinks in and
-    deforms no layer."""
+    """Penalty on an indenter in the surface [pressure / length], not a property of the material: that of the sensor
+    `ideal` is 60 times its young / thickness. With a low one, the indenter sinks in and does not deform the layer."""
 
 
 Skin = Annotated[FluidBackedShell | FoamPad | BondedLayer, Field(discriminator="medium")]

@@ -13,7 +13,6 @@ from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind
-from tactbench.core.spec.summary import Summary
 
 METRICS: Final = (
     "rmse", "mae", "mean_euclidean_error", "r2", "accuracy", "balanced_accuracy", "macro_f1", "recall_area",
@@ -36,24 +35,24 @@ class PlannedScene(Frozen):
 def in_drawn_order(planned: Sequence[PlannedScene], seed: int) -> tuple[PlannedScene, ...]:
     """Return the scenes with those of each group of `drawn_order` in an order drawn with `seed`.
 
-    The members of a group share out their own places in the sequence and their own starting times, so that what the
-    scene is of and how warm the sensor is by then are independent. Members are ordered by a hash (BLAKE2) of seed,
-    group and name: uniform over all orders, the same everywhere, and the same in every task that has the group.
+    The members of a group exchange their places in the sequence and their starting times, so that a scene is
+    independent of how warm the sensor is. They are ordered by a hash (BLAKE2) of seed, group and name: uniform over all
+    orders, and the same on every machine and in every task that has the group.
     """
+
+    def draw(item: PlannedScene) -> bytes:
+        text = "\x1f".join((str(seed), item.drawn_order, item.scene.name))
+        return hashlib.blake2b(text.encode(), digest_size=16).digest()
+
     found = list(planned)
-    groups = dict.fromkeys(item.drawn_order for item in planned if item.drawn_order)
-    for group in groups:
+    for group in dict.fromkeys(item.drawn_order for item in planned if item.drawn_order):
         places = [place for place, item in enumerate(planned) if item.drawn_order == group]
         times = sorted(planned[place].scene.starts_after_s for place in places)
-        members = sorted((planned[place] for place in places), key=lambda item: _draw(seed, group, item.scene.name))
+        members = sorted((planned[place] for place in places), key=draw)
         for place, start, item in zip(places, times, members, strict=True):
             scene = item.scene.model_copy(update={"starts_after_s": start})
             found[place] = item.model_copy(update={"scene": scene})
     return tuple(found)
-
-
-def _draw(seed: int, *names: str) -> bytes:
-    return hashlib.blake2b("\x1f".join((str(seed), *names)).encode(), digest_size=16).digest()
 
 
 class ChannelTarget(Frozen):
@@ -74,7 +73,7 @@ VECTOR_METRIC: Final = "mean_euclidean_error"
 
 
 class VectorTarget(Frozen):
-    """A target that is several channels of the reference, sample by sample; a row without one of them has no label."""
+    """A target that is several channels of the reference; a row without a value of one of them has no label."""
 
     source: Literal["vector"] = "vector"
     kind: ChannelKind = "position"
@@ -117,25 +116,65 @@ class Published(Frozen):
     """Differences to our evaluation that a reader must know."""
 
 
+class Summary(Frozen):
+    """A number for each channel over a window, from the channel's own samples up to the window's end.
+
+    Nothing is resampled: each stream is summarised on its own clock.
+    """
+
+    measure: Literal["mean", "deviation", "minimum", "maximum", "range", "change", "mean-step", "band-energy"]
+    """``mean``; ``deviation``: standard deviation; ``range``: maximum less minimum; ``change``: last less first;
+    ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square of what a causal
+    band-pass (Butterworth, two poles at either end) leaves, in the channel's unit squared."""
+    start: float = Field(default=0.0, ge=0)
+    end: float = Field(default=1.0, gt=0)
+    unit: Literal["recording", "s"] = "recording"
+    """Unit of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
+    protocol keeps; in a frame, they are shares of its length or seconds from its beginning."""
+    band_hz: tuple[float, float] | None = None
+    """Ends of the band of ``band-energy`` [Hz]; None for other measures."""
+    kinds: tuple[ChannelKind, ...] = ()
+    """Kinds of channels; empty: all that the task uses."""
+
+    @model_validator(mode="after")
+    def _one_window_one_band(self) -> Summary:
+        if not self.start < self.end:
+            raise ValueError("a window ends after it starts")
+        if self.unit == "recording" and self.end > 1:
+            raise ValueError("a window in shares of a recording ends at 1 at the latest; set unit: s for seconds")
+        if (self.measure == "band-energy") != (self.band_hz is not None):
+            raise ValueError("band_hz belongs to band-energy, which needs it")
+        if self.band_hz and not 0 < self.band_hz[0] < self.band_hz[1]:
+            raise ValueError("a band's lower end is above 0 Hz and below its upper end")
+        return self
+
+    @property
+    def name(self) -> str:
+        """Name in features and rows."""
+        band = "" if self.band_hz is None else f" {self.band_hz[0]:g}-{self.band_hz[1]:g} Hz"
+        whole = self.unit == "recording" and (self.start, self.end) == (0.0, 1.0)
+        unit = "s" if self.unit == "s" else "of the recording"
+        kinds = f" of {', '.join(self.kinds)}" if self.kinds else ""
+        return f"{self.measure}{band}{'' if whole else f' {self.start:g}-{self.end:g} {unit}'}{kinds}"
+
+
 class TaskSpec(Frozen):
-    """A task, described by data alone; the core carries it out."""
+    """A task as data, which the core carries out."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
     title: str
     question: str
     """The question in one sentence."""
     kind: Literal["regression", "classification", "events"]
-    """Kind of answer. Of `events`, the answer is when something begins: detectors give every frame a score, and
-    `alarms` turns scores into alarms."""
+    """Kind of answer. For `events`, it is when something begins: detectors score frames, `alarms` makes alarms."""
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels that an estimator may use."""
     optional_features: tuple[ChannelKind, ...] = ()
     """Further kinds, used where a sensor has them."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
-    """Unit of an answer. `recording`: one class or number for a recording, made in one of the three ways that follow;
-    its target is a label that does not change within a recording. `frame`: one for each window of the target's length,
-    from each channel's own samples in it."""
+    """Unit of an answer. `recording`: one class or number for each, by `summaries` and `features_by` or by `vote`;
+    its label does not change within a recording. `frame`: one for each window of the target's length."""
     summaries: tuple[Summary, ...] = ()
     """Numbers of each channel that are the features of a recording or of a frame."""
     alarms: AlarmPolicy | None = None
@@ -144,24 +183,21 @@ class TaskSpec(Frozen):
     """Largest rate of false alarms on validation recordings [1/min], below which the threshold of largest recall is
     chosen."""
     features_by: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable`` for features of the task's own, called with one recording, a tuple of
-    :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording. They are used
-    after `summaries`, or alone."""
+    """``module:callable`` for features of the task's own beside `summaries`, called with a recording as a tuple of
+    :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording."""
     vote: Literal["frames"] | None = None
-    """Combination of the answers for frames to that of a recording: the commonest class, the first of equals, or the
-    mean of numbers."""
+    """Combination of frames to the answer for a recording: the commonest class, the first of equals, or the mean."""
     metric: str
     """Name of the primary metric; see docs/glossary.md."""
     unit: str = "1"
     """Unit of the primary metric."""
     equivalence: float | None = Field(default=None, ge=0)
-    """Region of practical equivalence, in the metric's unit: scores that differ by no more are the same in use. None:
-    there is no such region."""
+    """Largest difference of scores that are the same in practical use, in the metric's unit; None: not stated."""
     scenes: tuple[PlannedScene, ...] = ()
     """Scenes that a rig records; empty: only recordings made elsewhere can answer."""
     campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)
-    """Scenes that a rig records for a split instead of `scenes`, by its name. Groups that such a split keeps apart are
-    left out one by one. Scenes of one name are the same in every campaign."""
+    """Scenes that a rig records for a split instead of `scenes`, by its name; such a split leaves its groups out one by
+    one. Scenes of one name are the same in every campaign."""
     protocols: tuple[str, ...]
     """Names of the allowed protocols, the default first."""
     splits: tuple[str, ...] = ()
@@ -170,8 +206,7 @@ class TaskSpec(Frozen):
     estimators: tuple[str, ...]
     """Names of the default estimators."""
     baselines: tuple[str, ...]
-    """Names of the trivial estimators, which stand in every table and are probed; the best one is the bar for
-    others."""
+    """Names of the trivial estimators, which stand in every table; others are measured by the best of them."""
     published: tuple[Published, ...] = ()
     beside: tuple[str, ...] = ()
     """Names of tasks that are run whenever this one is, to be read beside it."""
@@ -179,15 +214,20 @@ class TaskSpec(Frozen):
     """Default number of replicates on a simulated rig; None: that of any task."""
 
     @model_validator(mode="after")
-    def _has_a_metric_and_classes(self) -> TaskSpec:
+    def _has_a_metric_that_fits(self) -> TaskSpec:
         if self.metric not in METRICS:
             close = nearest(self.metric, METRICS) or METRICS
             raise ValueError(f"there is no metric {self.metric!r}; did you mean {' or '.join(close)}?")
         if self.kind == "classification" and isinstance(self.target, ChannelTarget):
             raise ValueError(
-                f"a channel of kind {self.target.kind} is a number on a continuous scale: give classes or a threshold "
-                "(a LabelTarget, or a SlipTarget of frames) to classify, or ask by kind: regression"
+                f"a channel of kind {self.target.kind} is a number: classes have a LabelTarget, or a SlipTarget of "
+                "frames; kind: regression predicts numbers"
             )
+        vector = isinstance(self.target, VectorTarget)
+        if vector and self.kind != "regression":
+            raise ValueError("a vector is predicted by kind: regression")
+        if vector != (self.metric == VECTOR_METRIC):
+            raise ValueError(f"metric {VECTOR_METRIC} and a target that is a vector belong together")
         return self
 
     @model_validator(mode="after")
@@ -206,34 +246,22 @@ class TaskSpec(Frozen):
         return self
 
     @model_validator(mode="after")
-    def _vectors_have_a_metric_of_their_own(self) -> TaskSpec:
-        vector = isinstance(self.target, VectorTarget)
-        if vector and self.kind != "regression":
-            raise ValueError("a vector is predicted by kind: regression")
-        if vector != (self.metric == VECTOR_METRIC):
-            raise ValueError(f"metric {VECTOR_METRIC} and a target that is a vector belong together")
-        return self
-
-    @model_validator(mode="after")
     def _recordings_are_answered_in_one_way(self) -> TaskSpec:
         if self.answer_per == "frame":
             return self
         summarised = bool(self.summaries or self.features_by)
         reduced = isinstance(self.target, ChannelTarget) and self.target.reduce is not None
-        if reduced and self.answer_per == "sample":
-            raise ValueError("a channel is reduced to one number for answer_per: recording alone")
         if self.answer_per == "sample":
-            if summarised or self.vote:
-                raise ValueError("summaries, features_by and vote belong to answer_per: recording")
+            if summarised or self.vote or reduced:
+                raise ValueError("summaries, features_by, vote and a channel's reduce belong to answer_per: recording")
             return self
         if summarised == bool(self.vote):
             raise ValueError("answer_per: recording needs either summaries or features_by, or else vote: frames")
         if not isinstance(self.target, LabelTarget) and not reduced:
-            raise ValueError("answer_per: recording asks for a label, or for a channel with `reduce`")
+            raise ValueError("answer_per: recording needs a label, or a channel with `reduce`")
         if "in-session" in self.splits:
-            raise ValueError("split in-session cuts recordings in time; answer_per: recording asks each as a whole")
-        unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at)
-        if unseen:
+            raise ValueError("split in-session cuts recordings in time; answer_per: recording takes each as a whole")
+        if unseen := {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at):
             raise ValueError(f"summaries of {', '.join(sorted(unseen))}, which the task's features do not have")
         return self
 
@@ -259,14 +287,10 @@ class TaskSpec(Frozen):
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
         """Return the published figure for a result, one for this sensor first; None: none is comparable."""
-        fitting = [
-            one
-            for one in self.published
-            if one.protocol == protocol
-            and one.sensor in (None, sensor)
-            and one.estimator in (None, estimator)
-            and (one.split is None or split is None or one.split == split)
-        ]
+        fitting = (
+            one for one in self.published if one.protocol == protocol and one.sensor in (None, sensor)
+            and one.estimator in (None, estimator) and (split is None or one.split in (None, split))
+        )  # fmt: skip
         return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)
 
     def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:

@@ -30,13 +30,7 @@ _WORDS = {
 
 @lru_cache(maxsize=256)
 def parse(unit: str) -> tuple[float, Dimension]:
-    """Return the factor to SI and the dimension of `unit`.
-
-    Raises
-    ------
-    UsageError
-        If a part of `unit` is not in the table; the message offers the nearest names.
-    """
+    """Return the factor to SI and the dimension of `unit`; raises UsageError with near names if it is unknown."""
     if not unit.strip():
         raise UsageError("The unit is empty.", hint="Write 1 for a pure number, count for a raw reading.")
     factor, exponents, sign = 1.0, (0,) * len(_BASE), 1
@@ -72,17 +66,11 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def conversion(given: str, target_unit: str) -> float:
-    """Return the factor that turns a number in `given` into one in `target_unit`.
-
-    Raises
-    ------
-    UsageError
-        If either unit is unknown or the two measure different things.
-    """
+    """Return the factor from `given` to `target_unit`; raises UsageError for an unknown one or another dimension."""
     (size, dimension), (target, wanted_dimension) = parse(given), parse(target_unit)
     if dimension != wanted_dimension:
         raise UsageError(
             f"The unit {given!r} cannot be turned into {target_unit!r}: they measure different things.",
-            hint="Correct the unit, or state the conversion explicitly.",
+            hint="Correct the unit.",
         )
     return size / target

@@ -16,8 +16,6 @@ Path_ = tuple[str | int, ...]
 Places = dict[Path_, tuple[int, yaml.Node]]
 """The line and the node of every key and item, by its path in the file."""
 
-MOST_BYTES = 2**17
-"""Largest file that is read; the largest one of this project has 12 kB."""
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """The loader in C, which is eight times as fast, where PyYAML was built with it."""
 _INT, _FLOAT, _TEXT = (f"tag:yaml.org,2002:{name}" for name in ("int", "float", "str"))
@@ -30,18 +28,12 @@ _ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
 def load_yaml(path: Path, model: type[M]) -> M:
     """Return the file at `path` as a `model`.
 
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, is not YAML, repeats a key, has an unknown or mistyped key (the nearest known one
-        is offered), or a value that `model` refuses. The message starts with ``file:line``.
+    Raises ConfigError, which starts with ``file:line``, if the file cannot be read, is not YAML, repeats a key, has an
+    unknown key (the nearest known one is offered), or a value that `model` refuses.
     """
     file = str(path)
     try:
-        held = path.read_bytes()
-        if len(held) > MOST_BYTES:
-            raise ConfigError(file, None, f"is larger than {MOST_BYTES // 1024} KiB.", hint="Is it the right file?")
-        node, data = _loaded(held.decode(), file)
+        node, data = _loaded(path.read_text(encoding="utf-8"), file)
     except OSError as error:
         raise ConfigError(
             file, None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
@@ -78,7 +70,7 @@ def _loaded(text: str, file: str) -> tuple[Any, Any]:
         mark = getattr(error, "problem_mark", None)
         problem = getattr(error, "problem", None) or "is not YAML"
         raise ConfigError(file, mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax.") from error
-    except (ValueError, RecursionError) as error:  # a number or date that is none, or brackets without end
+    except (ValueError, RecursionError) as error:  # a number or date that is not valid, or brackets without end
         raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
 
 

@@ -10,10 +10,9 @@ from pydantic import FiniteFloat, TypeAdapter
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.profile import ForceProfile, ForceRamp
 from tactbench.core.spec.quantity import Quantity, sourced
-from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.spec.rig import Parameter, SensorDescriptor
 from tactbench.core.spec.scene import Indenter, Scene
 
 _BY = "the command line"

@@ -46,7 +46,7 @@ def quiet(scene: Scene) -> Scene:
     profile = scene.profile
     if scene.slide is not None:
         raise NotApplicable(f"The scene {scene.name!r} slides, and this rig only presses.")
-    rises = profile.kind == "ramp" and profile.start.to("N") == 0 < profile.end.to("N")
+    rises = profile.kind == "ramp" and profile.corners[1][0] == 0 < profile.corners[1][-1]
     if not rises or not profile.duration.to("s") > profile.hold_s:
         raise NotApplicable(
             f"The scene {scene.name!r} is no rise of the force from 0 N, and this rig presses no other."
@@ -81,7 +81,7 @@ class EmulatedPress:
         self.skin_m = skin_m
         self._start_s = 0.0
         self._hold_s, self._duration_s = profile.hold_s, profile.duration.to("s")
-        self._s_per_n = (self._duration_s - self._hold_s) / profile.end.to("N")
+        self._s_per_n = (self._duration_s - self._hold_s) / profile.corners[1][-1]
         self._corners = profile.corners
         depths_m, forces_n = simulated.press_curve(largest_n)
         steepness = (forces_n[-1] - forces_n[-2]) / (depths_m[-1] - depths_m[-2])

@@ -331,7 +331,7 @@ def _course(scene: Scene) -> Course:
     end_s = profile.duration.to("s")
     return Course(
         setpoint_n=lambda at_s: float(np.interp(at_s, times, forces)),
-        slope_n_s=profile.end.to("N") / (end_s - profile.hold_s),
+        slope_n_s=forces[-1] / (end_s - profile.hold_s),
         ramp_s=profile.hold_s,
         end_s=end_s,
     )

@@ -105,8 +105,8 @@ def carried_out(
 def _load(scene: Scene) -> tuple[FloatArray, Load]:
     """Return the reference clock and the true force: held at the start, then straight to the end."""
     profile = scene.profile
-    duration, hold = profile.duration.to("s"), profile.hold.to("s")
-    start, end = profile.start.to("N"), profile.end.to("N")
+    duration, hold = profile.duration.to("s"), profile.hold_s
+    start, end = profile.corners[1][0], profile.corners[1][-1]
     if not duration > 0 or hold < 0 or min(start, end) < 0:
         raise RigError(
             f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "

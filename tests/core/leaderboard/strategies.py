@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from tactbench.core.spec.status import STATUSES
+from tactbench.core.spec.row import STATUSES
 
 from .rows import row
 

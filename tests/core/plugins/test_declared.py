@@ -27,21 +27,19 @@ def test_tasks_of_a_folder_and_of_those_below_are_found_once_and_hidden_ones_are
     assert declared_in(tmp_path) == (task("where"), task("there"))
     assert declared_in(None) == ()
     write(tmp_path / "other", task("there", "m"))
-    with pytest.raises(UsageError, match="'there' is not the same in"):
+    with pytest.raises(UsageError, match="'there'"):
         declared_in(tmp_path)
 
 
 def test_declared_tasks_stand_beside_installed_ones_whose_names_they_may_not_have():
     registry = installed()
-    assert with_declared(registry, ()) is registry
+    assert with_declared(registry, ()).tasks.names() == registry.tasks.names()
     found = with_declared(registry, [task("where")])
     assert set(found.tasks.names()) == {*registry.tasks.names(), "where"}
     owned = found.tasks.owned("where")
-    assert (owned.descriptor.spec, DeclaredTask.model_validate_json(owned.declared)) == (
-        task("where").spec,
-        task("where"),
-    )
-    with pytest.raises(UsageError, match=r"'force' .* has the name of an installed one"):
+    assert owned.descriptor.spec == task("where").spec
+    assert DeclaredTask.model_validate_json(owned.declared) == task("where")
+    with pytest.raises(UsageError, match="'force'"):
         with_declared(registry, [task("force")])
 
 

@@ -27,9 +27,9 @@ def test_a_staircase_goes_up_and_down_in_equal_steps():
 @pytest.mark.parametrize(
     ("name", "given", "says"),
     [
-        ("sine", {"amplitude": 9}, "amplitude is given as 9 N, and at most its mean, 2 N"),
-        ("staircase", {"steps": 2.5}, "steps is given as 2.5, and a whole number"),
-        ("press-hold-release", {"rise": 0}, "rise is given as 0 s, and 0.001 s or more"),
+        ("sine", {"amplitude": 9}, "amplitude .* 9 N"),
+        ("staircase", {"steps": 2.5}, "steps .* 2.5"),
+        ("press-hold-release", {"rise": 0}, "rise .* 0 s"),
     ],
 )
 def test_a_parameter_that_cannot_be_is_named(name, given, says):

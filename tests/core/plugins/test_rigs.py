@@ -45,8 +45,11 @@ def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_
 
 
 @pytest.mark.parametrize(("doors", "engine"), [(("effect", "indenter"), "isolated"), (("indenter",), "in-process")])
-def test_what_other_tasks_of_the_run_name_changes_no_recording_of_a_scene_that_does_not(shell, without, doors, engine):
+def test_what_other_tasks_of_the_run_name_changes_no_recording_of_a_scene_that_does_not(
+    request, without, doors, engine
+):
     tasks = [word for door in doors for word in ("--task", f"patching-{door}")]
-    beside = recordings(shell, "beside", *tasks, "--jobs", "1", "--engine", engine)
+    command = request.getfixturevalue("verbs" if engine == "isolated" else "shell")
+    beside = recordings(command, "beside", *tasks, "--jobs", "1", "--engine", engine)
     assert len(beside) == len(without) + 2 * len(doors)
     assert all(np.array_equal(without[name], beside[name]) for name in without)

@@ -39,12 +39,12 @@ def test_every_nuisance_of_a_sensor_is_set_alone_and_read_under_its_name(spec):
 @pytest.mark.parametrize(
     ("changed", "values", "says"),
     [
-        (SCENE, {"placement_scatter_mm": -0.1}, "placement_scatter_mm = -0.1 is below 0"),
-        (SCENE, {"surface_kinetic_friction": 2.0}, "surface_kinetic_friction = 2: .*static >= kinetic"),
-        (SENSORS[0], {"taxel_white_count": -1.0}, "taxel_white_count = -1 is below 0"),
-        (Scene(name="a"), {"drive_delay_ms": 5.0}, "drive_delay_ms: the scene has no drive"),
-        (Scene(name="a"), {"surface_hurst": 0.5}, "surface_hurst: the scene has no slide"),
-        (SENSORS[2], {"taxel_warm_up_count": 5.0}, "warm_up_tau is needed"),
+        (SCENE, {"placement_scatter_mm": -0.1}, "placement_scatter_mm = -0.1"),
+        (SCENE, {"surface_kinetic_friction": 2.0}, "surface_kinetic_friction = 2: "),
+        (SENSORS[0], {"taxel_white_count": -1.0}, "taxel_white_count = -1"),
+        (Scene(name="a"), {"drive_delay_ms": 5.0}, "drive_delay_ms: .*no drive"),
+        (Scene(name="a"), {"surface_hurst": 0.5}, "surface_hurst: .*no slide"),
+        (SENSORS[2], {"taxel_warm_up_count": 5.0}, "warm_up_tau"),
     ],
 )
 def test_a_value_that_cannot_be_is_refused_by_name(changed, values, says):

@@ -7,8 +7,8 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import THRESHOLDS, SlipTarget, SlipThresholds
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.quantity import assumed
+from tactbench.core.spec.rig import Parameter
 from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, RigFile
 from tactbench.core.spec.scene import Indenter, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import ChannelSpec, DataSheet, Nuisances, PhysicalRange, SensorSpec, StreamSpec

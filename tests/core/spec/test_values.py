@@ -4,24 +4,41 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
-from tactbench.core.errors import NotApplicable
+from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec import force_profiles
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import THRESHOLDS, SlipTarget, nanoseconds
 from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
-from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.quantity import assumed, derived, measured, sourced
-from tactbench.core.spec.row import lower_is_better, plural
-from tactbench.core.spec.scene import Environment, Indenter, Slide
+from tactbench.core.spec.rig import Parameter
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, OF_REPLICATES, RowModel, lower_is_better, plural
+from tactbench.core.spec.scene import RANGES, Environment, Indenter, Slide
 from tactbench.core.spec.sensor import Nuisances
 from tactbench.core.spec.skin import SheetTable
 from tactbench.core.spec.task import PlannedScene, Published, in_drawn_order
-from tactbench.plugin import LabelTarget, Scene, Source, Summary, VectorTarget, load_registry
-from tests.core.evaluation.made import force_task
+from tactbench.plugin import (
+    ChannelSpec,
+    ForcePath,
+    ForceRamp,
+    LabelTarget,
+    Scene,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    Summary,
+    VectorTarget,
+    load_registry,
+)  # fmt: skip
+from tests.core.evaluation.made import force_task, sensor
 from tests.core.events.made import policy
+from tests.core.leaderboard.rows import row
 
-FORCE = load_registry().tasks["force"].spec
+REGISTRY = load_registry()
+FORCE = REGISTRY.tasks["force"].spec
+WHY = Source(tag="assumed", reference="a test")
 FRAMES = SlipTarget(hop_s=0.01, window_s=0.1)
 MEAN, VOTE = (Summary(measure="mean"),), {"vote": "frames", "answer_per": "recording", "splits": ()}
 LABEL = {"kind": "classification", "metric": "macro_f1", "target": LabelTarget(name="a"), "unit": "1"}
@@ -156,11 +173,11 @@ def test_members_of_a_drawn_group_share_out_their_places_and_times():
 
 
 def test_a_scenario_takes_the_place_of_the_usual_nuisances_and_is_known_by_name():
-    biotac = load_registry().sensors["biotac"].spec
+    biotac = REGISTRY.sensors["biotac"].spec
     assert biotac.handled(None) is biotac
     for name, scenario in biotac.scenarios.items():
         assert biotac.handled(name).nuisances == {**biotac.nuisances, **scenario.nuisances}
-    with pytest.raises(NotApplicable, match="no scenario 'no-such'"):
+    with pytest.raises(NotApplicable, match="'no-such'"):
         biotac.handled("no-such")
 
 
@@ -177,10 +194,99 @@ def test_what_the_converter_and_white_noise_hide():
 
 
 def test_a_table_over_the_sheet_is_straight_between_its_entries_and_even_beyond():
-    source = Source(tag="assumed", reference="a test")
-    table = SheetTable(x_mm=(0, 2, 3), angle_deg=(0, 90), value_mm=((1, 3), (5, 11), (9, 9)), source=source)
+    table = SheetTable(x_mm=(0, 2, 3), angle_deg=(0, 90), value_mm=((1, 3), (5, 11), (9, 9)), source=WHY)
     found = table.at(np.array([-1.0, 0.0, 1.0, 2.0, 3.0, 4.0]), np.radians([-45.0, 0.0, 45.0, 120.0]))
     np.testing.assert_allclose(found, [[2, 1, 2, 3], [2, 1, 2, 3], [5, 3, 5, 7], [8, 5, 8, 11], [9] * 4, [9] * 4])
     assert (table.least_mm, table.most_mm) == (1, 11)
-    line = SheetTable(x_mm=(0,), angle_deg=(0, 90), value_mm=((1, 3),), source=source)
+    line = SheetTable(x_mm=(0,), angle_deg=(0, 90), value_mm=((1, 3),), source=WHY)
     np.testing.assert_allclose(line.at(np.array([4.0]), np.radians([45.0])), [[2.0]])
+
+
+# Force over time
+
+
+PATH = ForcePath(times_s=(0.0, 0.5, 1.0, 2.0), forces_n=(0.5, 0.5, 3.0, 1.0), samples=100, source=WHY)
+
+
+def ramp(hold_s):
+    return ForceRamp(start=q(3.0, "N"), hold=q(hold_s, "s"))
+
+
+@pytest.mark.parametrize(
+    ("profile", "hold_s", "largest_n", "corners"),
+    [
+        (PATH, 0.5, 3.0, (PATH.times_s, PATH.forces_n)),
+        (ramp(6), 6.0, 5.0, ((0.0, 6.0, 60.0), (3.0, 3.0, 5.0))),
+        (ramp(60), 60.0, 5.0, ((0.0, 60.0), (3.0, 3.0))),
+        (ramp(70), 60.0, 5.0, ((0.0, 60.0), (3.0, 3.0))),
+    ],
+)
+def test_where_a_profile_begins_rests_and_ends(profile, hold_s, largest_n, corners):
+    assert (profile.hold_s, profile.largest_n, profile.corners) == (hold_s, largest_n, corners)
+    assert profile.duration.to("s") == corners[0][-1]
+    scene = Scene(name="a", profile=profile)
+    assert Scene.model_validate_json(scene.model_dump_json()) == scene
+
+
+def test_a_profile_that_states_no_kind_is_a_ramp():
+    assert isinstance(Scene.model_validate({"name": "a", "profile": {"samples": 5}}).profile, ForceRamp)
+
+
+# Dimensions of indenters
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"length": q(2)}, "'length'"),
+        ({"radius": q(2, "s")}, "radius: .*'mm'"),
+        ({"radius": q(float("nan"))}, "radius .* nan mm"),
+        ({"radius": q(0)}, "radius .* 0 mm"),
+    ],
+)
+def test_a_dimension_that_cannot_be_is_named(given, says):
+    with pytest.raises(UsageError, match=f"'cylinder': {says}"):
+        REGISTRY.indenters["cylinder"].sizes(given)
+
+
+def test_dimensions_come_in_the_unit_of_the_shape_and_others_by_default():
+    assert REGISTRY.indenters["pin"].sizes({"radius": q(0.003, "m")}) == {"radius": 3.0, "fillet": 0.0}
+
+
+# Sensors
+
+
+def test_axes_of_a_magnet_are_one_site():
+    axes = [ChannelSpec(name=f"{site}{axis}", kind="taxel", site=site) for site in "ab" for axis in "xyz"]
+    lone, warm = ChannelSpec(name="lone", kind="taxel"), ChannelSpec(name="warm", kind="dc_temperature", site="a")
+    stream = StreamSpec(name="magnets", channels=(*axes[:3], lone, *axes[3:], warm))
+    pad = SensorSpec(**sensor().model_dump(exclude={"streams"}), streams=(stream,))
+    sites = [[one.name for one in site] for site in pad.sites("taxel")]
+    assert sites == [["ax", "ay", "az"], ["lone"], ["bx", "by", "bz"]]
+
+
+@pytest.mark.parametrize("spec", [one.spec for one in REGISTRY.sensors], ids=lambda spec: spec.name)
+def test_figures_of_devices_and_ranges_have_sources_and_are_not_recorded(spec):
+    assert {"ranges", "data_sheet"}.isdisjoint(spec.model_dump())
+    for fact in (getattr(spec.data_sheet, name) for name in OF_DEVICES):
+        assert fact is None or (fact.source.tag in ("sourced", "derived", "measured") and fact.source.reference)
+    stated = {"offset_scale": 1.0, **Scene(name="s").nuisances()}
+    stated |= {name: one.value for name, one in spec.settable().items()}
+    for name, one in {**RANGES, **spec.ranges}.items():
+        assert one.lower < one.upper
+        assert one.lower <= stated[name] <= one.upper, name
+
+
+# Rows
+
+
+def test_every_key_of_a_row_and_of_a_table_has_its_format():
+    assert set(row()) | set(JSON_KEYS) | set(OF_REPLICATES) == set(FORMAT)
+    assert [key for key, value in row().items() if type(value) not in FORMAT[key]] == []
+
+
+def test_a_row_holds_no_number_that_is_none():
+    assert RowModel(cell="a", status="done", score=0.5).score == 0.5
+    for score in (float("nan"), float("inf"), "0.5"):
+        with pytest.raises(ValidationError):
+            RowModel(cell="a", status="done", score=score)

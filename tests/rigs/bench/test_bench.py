@@ -14,7 +14,6 @@ from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings, ForceEntry
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
 from tactbench.plugin.devices import EmulatedDevices, NamedDevice, RigFile, emulators_of
-from tactbench.sensors.icub.emulator import Bus
 from tests.devices.emulating import emulating
 
 REGISTRY = load_registry()

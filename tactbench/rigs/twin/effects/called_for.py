@@ -107,7 +107,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(True, f"a motor's force loop may change the load at any rate; {100 * share:.0f} % comes late")
     profile = scene.profile
     if len(set(profile.corners[1])) == 1:
-        return _no(f"the load is constant: {profile.start.to('N'):g} N throughout")
+        return _no(f"the load is constant: {profile.corners[1][0]:g} N throughout")
     slowest = max(term.tau.to("s") for term in terms)
     late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"
     return Reason(True, f"{late}; left out if that is below a third of noise and rounding by the scene's load table")
@@ -377,7 +377,7 @@ def _most_k(scene: Scene, sensor: SensorSpec) -> float:
     conductance = 4e-3 * sensor.parameters["contact_conductivity"].to("W/m/K") * widest
     profile = scene.profile
     # A force loop touches the skin while it waits, too.
-    idle = 0.0 if profile.start.to("N") > 0 or scene.drive is not None else profile.hold.to("s")
+    idle = 0.0 if profile.corners[1][0] > 0 or scene.drive is not None else profile.hold_s
     pressed_s = max(profile.duration.to("s") - idle, 0.0)
     share = min(1.0, conductance * pressed_s / sensor.parameters["heat_capacity"].to("J/K"))
     return _difference_k(scene, sensor) * share
