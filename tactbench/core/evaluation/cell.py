@@ -35,7 +35,7 @@ from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
+from tactbench.core.evaluation.replicate_sums import replicates, summed
 from tactbench.core.evaluation.sets import tare_s
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -215,8 +215,6 @@ def _result(
     elif rules is None:
         sums = METRICS["accuracy"].rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
-        if task.answer_per != "frame":
-            beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
         scores |= {f"F1 of {label}": float(one) for label, one in zip(classes, class_f1(sums, n_classes), strict=True)}
     if rules is not None:
         detected = [one for fold in answered for one in fold.detected]

@@ -61,9 +61,10 @@ def summed(
 
     def against(y: npt.NDArray[Any]) -> dict[str, Any]:
         sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))
-        lines = [_without_needless_points(line) for line in sums.tolist()]
+        # Counts are written as whole numbers; all else keeps every digit.
+        lines = [[int(one) if one.is_integer() and abs(one) < 2**53 else one for one in line] for line in sums.tolist()]
         if n_classes:
-            lines = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
+            lines = [[value for place in np.flatnonzero(line) for value in (int(place), line[place])] for line in lines]
         return {"sums": lines, "own": _plain(own_scores(metric, sums, n_classes))}
 
     return {
@@ -76,22 +77,6 @@ def summed(
 
 def _plain(scores: FloatArray) -> list[float | None]:
     return [float(one) if np.isfinite(one) else None for one in scores]
-
-
-def recordings_right(tested: Answers) -> tuple[int, int] | None:
-    """Return how many recordings most answers to which are right, and how many were tested; None if one has classes."""
-    right = []
-    for place in np.unique(tested.recording):
-        mine = tested.recording == place
-        if np.ptp(tested.y_true[mine]):
-            return None  # no recording of several classes is right or wrong as a whole
-        right.append(np.bincount(tested.y_pred[mine]).argmax() == tested.y_true[mine][0])
-    return sum(map(bool, right)), len(right)
-
-
-def _without_needless_points(line: list[float]) -> list[float]:
-    """Return counts as whole numbers; all else keeps every digit."""
-    return [int(value) if value.is_integer() and abs(value) < 2**53 else value for value in line]
 
 
 def tables_of(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:

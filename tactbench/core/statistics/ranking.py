@@ -12,7 +12,7 @@ from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import EXCESS
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.row import lower_is_better
-from tactbench.core.statistics.influence import PairableRows, scores_of, together
+from tactbench.core.statistics.paired import PairableRows, scores_of, together
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
 Row = Mapping[str, Any]

@@ -26,13 +26,8 @@ _MEDIANS = (
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
 """Numbers of a row whose median over replicates stands in the table."""
-_INTERVALS = {
-    "score": ("ci_low", "ci_high"),
-    "score_beyond_floor": ("beyond_floor_ci_low", "beyond_floor_ci_high"),
-    "true_score": ("true_ci_low", "true_ci_high"),
-    "reference_score": ("reference_ci_low", "reference_ci_high"),
-}
-"""Where the interval of a number stands."""
+_INTERVALS = {"score": "", "score_beyond_floor": "beyond_floor_", "true_score": "true_", "reference_score": "reference_"}
+"""Numbers with an interval, and how its keys begin."""
 
 
 def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -59,7 +54,7 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     `replicate_scores`, `seeds`, `score_min` and `score_max` (the range of the replicates' scores). `recordings_right`
     and `recordings_asked` are means over replicates.
 
-    The score that ranks is here and nowhere else decided: where all rows that may stand in one table know the error
+    The score that ranks is decided here: where all rows that may stand in one table know the error
     against the true force, `metric` is ``true_rmse`` and `score`, intervals and replicates are of that error; the error
     against the reference is under `reference_score`. An error beyond the floor, which estimates the true one, is then
     left out.
@@ -74,12 +69,8 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def _by_truth(rows: Sequence[Row]) -> list[Row]:
-    known: dict[tuple[Any, ...], bool] = {}
-    for row in rows:
-        if row["status"] == "done":
-            key = _ranked_together(row)
-            known[key] = known.get(key, True) and row.get("true_score") is not None
-    return [_true(row) if row["status"] == "done" and known[_ranked_together(row)] else row for row in rows]
+    unknown = {_ranked_together(row) for row in rows if row["status"] == "done" and row.get("true_score") is None}
+    return [_true(row) if row["status"] == "done" and _ranked_together(row) not in unknown else row for row in rows]
 
 
 def _true(row: Row) -> Row:
@@ -120,15 +111,11 @@ def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
     for row in rows:
         if row.get("is_baseline") and row["status"] == "done":
             by_group.setdefault(_group(row), []).append(row)
-    bars: dict[tuple[Any, bool], float | None] = {}
-    for group, members in by_group.items():
-        best = min if lower_is_better(members[0]["metric"]) else max
-        for timed in (False, True):
-            knowing = {"reference"} if timed else {"reference", "time"}
-            known = [one["score"] for one in members if one.get("looks_at") not in knowing]
-            bars[group, timed] = best(known, default=None)
     for row in rows:
-        row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
+        knowing = {"reference"} if row.get("looks_at") == "time" else {"reference", "time"}
+        able = [one for one in by_group.get(_group(row), ()) if one.get("looks_at") not in knowing]
+        best = min if able and lower_is_better(able[0]["metric"]) else max
+        row["baseline"] = best((one["score"] for one in able), default=None)
 
 
 def _name(row: Row) -> str:
@@ -146,7 +133,11 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
     if not done:
         return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, **named}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_recordings(done)
-    return {**found, **named, "remarks": _remarks(members, done), "findings": _told(done, "findings")}
+    stopped = [
+        f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}"
+        for row in members if row["status"] != "done"
+    ]  # fmt: skip
+    return {**found, **named, "remarks": [*_texts(done, "remarks"), *stopped], "findings": _texts(done, "findings")}
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -156,23 +147,21 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
     timed = next((row for row in done if row.get("fit_s") is not None), first)
     here = [row for row in done if row["host"] == timed["host"]]
-    found = dict(first) | {key: timed[key] for key in Cost.model_fields if key in timed}
-    for key in _MEDIANS:
-        if key in first:
-            found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
+    found = {**first, **{key: timed[key] for key in Cost.model_fields if key in timed}}
+    for key in [key for key in _MEDIANS if key in first]:
+        found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
     level = 0.0
-    for key, (low, high) in _INTERVALS.items():
-        if low in first:
+    for key, prefix in _INTERVALS.items():
+        if f"{prefix}ci_low" in first:
             values = [row.get(key) for row in done]
-            known = None if None in values else median_interval([float(value) for value in values])  # type: ignore[arg-type]
-            found[low], found[high] = (known.low, known.high) if known else (None, None)
+            known = None if None in values else median_interval(values)
+            found |= {f"{prefix}ci_{end}": getattr(known, end, None) for end in ("low", "high")}
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     events = [row.get("events") or {} for row in done]
     alarms = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
-    points_of = [row.get("operating_points") or [] for row in done]
-    alike = len({len(points) for points in points_of}) == 1
+    points_of = [row.get("operating_points") or [] for row in done]  # a detector that has a threshold has none
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
@@ -181,13 +170,12 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
-        "events": _middle(events) | ({} if None in alarms else {"alarms": _mean(alarms)}),
-        "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
+        "events": _middle(events) | ({} if None in alarms else {"alarms": sum(alarms) / len(alarms)}),
+        "operating_points": [_middle(points) for points in zip(*points_of, strict=False)],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
-        **{key: _mean([row.get(key) for row in done]) for key in ("recordings_right", "recordings_asked")},
     }
 
 
@@ -216,8 +204,8 @@ def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
     own, unit = kept.get("own") or [], str(kept.get("unit") or "session")
     found = {**row, **_counted(done, max(len(own), 1), unit, [one for one in own if one is not None])}
     if not own or row["ci_low"] is None:
-        ends = dict.fromkeys([end for both in _INTERVALS.values() for end in both if end in row])
-        found |= {**ends, "ci_method": "", "replicates": {}}
+        ends = [f"{prefix}ci_{end}" for prefix in _INTERVALS.values() for end in ("low", "high")]
+        found |= {**dict.fromkeys(end for end in ends if end in row), "ci_method": "", "replicates": {}}
     return found
 
 
@@ -238,10 +226,6 @@ def _median(values: Sequence[Any]) -> float | None:
     return median(known) if known else None
 
 
-def _mean(values: Sequence[Any]) -> float | None:
-    return None if None in values else sum(values) / len(values)
-
-
 def _chosen(done: Sequence[Row]) -> dict[str, Any]:
     """Return what was chosen on validation data: of what replicates chose, the lower median."""
     names = dict.fromkeys(name for row in done for name in row["chosen"])
@@ -260,18 +244,10 @@ def _added(tables: Sequence[Any]) -> Any:
     return [[sum(counts) for counts in zip(*lines, strict=True)] for lines in zip(*tables, strict=True)]
 
 
-def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
-    """Return what rows remark, and which were stopped."""
-    stopped = [row for row in members if row["status"] != "done"]
-    texts = [f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped]
-    return [*_told(done, "remarks"), *texts]
-
-
-def _told(done: Sequence[Row], key: str) -> list[str]:
+def _texts(done: Sequence[Row], key: str) -> list[str]:
     """Return the texts that rows have under a key, those of a part of the replicates with their number."""
-    many = len(done)
     counts = Counter(text for row in done for text in dict.fromkeys(row.get(key) or ()))
-    return [text if n == many else f"in {n} of {many} replicates: {text}" for text, n in counts.items()]
+    return [text if n == len(done) else f"in {n} of {len(done)} replicates: {text}" for text, n in counts.items()]
 
 
 @dataclass(frozen=True)
@@ -284,7 +260,7 @@ class MedianInterval:
     """Coverage: 0.95, or that of the whole range where five replicates reach no more."""
 
 
-def median_interval(values: Sequence[float]) -> MedianInterval | None:
+def median_interval(values: Sequence[Any]) -> MedianInterval | None:
     """Return the 95 % interval of the median of what `values` were drawn from; None of fewer than five.
 
     Notes
