@@ -141,15 +141,13 @@ def _cost(
     context: CellContext,
 ) -> tuple[Cost, tuple[str, ...]]:
     """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
-    recorded, task, rules, clock = data.recorded, data.task, data.rules, context.clock
-    looks_back = max(fitted.k, data.window - 1)
-    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, looks_back)
+    parts, remarks = stated_delay_ms(data, descriptor, max(fitted.k, data.window - 1))
     p50 = p95 = largest = calls = None
     if context.latency:
-        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
+        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), context.clock)
         p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
         p95, largest = tail_ms(waits_s)
-        ready_s = features_s(recorded, task, rules, descriptor, fitted.fold.test.X, fitted.k, clock)
+        ready_s = features_s(data, descriptor, fitted.fold.test.X, fitted.k, context.clock)
         parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
     cost = Cost(
         search_s=sum(one.search_s for one in answered),

@@ -13,10 +13,16 @@ from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.frames import slip_target
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.slip_reference import SlipReference
-from tactbench.core.events.alarms import alarms
+from tactbench.core.events.alarms import (
+    EventScores,
+    GroundTruth,
+    alarms,
+    displacement_at_detection,
+    latency_s,
+    score_events,
+)
 from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, threshold_curve
 from tactbench.core.events.labels import GROSS, UNDECIDED
-from tactbench.core.events.metrics import EventScores, GroundTruth, displacement_at_detection, latency_s, score_events
 from tactbench.core.samples import Answers, FloatArray, IntArray, Part
 from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec

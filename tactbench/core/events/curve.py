@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.alarms import alarms
-from tactbench.core.events.metrics import EventScores, GroundTruth, score_events
+from tactbench.core.events.alarms import EventScores, GroundTruth, alarms, score_events
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import AlarmPolicy
 

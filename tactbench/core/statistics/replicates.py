@@ -26,7 +26,12 @@ _MEDIANS = (
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
 """Numbers of a row whose median over replicates stands in the table."""
-_INTERVALS = {"score": "", "score_beyond_floor": "beyond_floor_", "true_score": "true_", "reference_score": "reference_"}
+_INTERVALS = {
+    "score": "",
+    "score_beyond_floor": "beyond_floor_",
+    "true_score": "true_",
+    "reference_score": "reference_",
+}
 """Numbers with an interval, and how its keys begin."""
 
 
@@ -160,7 +165,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     events = [row.get("events") or {} for row in done]
-    alarms = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
+    alarms: list[Any] = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
     points_of = [row.get("operating_points") or [] for row in done]  # a detector that has a threshold has none
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
