@@ -139,17 +139,16 @@ class EventRules:
                     hint="Give every fold test recordings of disturbances (label `event: disturbance`).",
                 ) from error
         shares = np.split(found, np.cumsum([len(one) for one in onsets])[:-1])
-        lines: list[tuple[int, float, int, int, int]] = []
+        columns = []
         for one, onset, share in zip(several, onsets, shares, strict=True):
-            t_ns = np.rint(data.tables[one.place].time_s * 1e9).astype(np.int64)
-            for event, hit, at in [
-                (0, 0.0, int(one.t_ns[0])),
-                *((1, *pair) for pair in zip(share, onset, strict=True)),
-            ]:
-                last = max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)
-                lines.append((event, hit, one.place, int(data.tables[one.place].row[last]), at))
-        true, hits, place, row, at_ns = map(np.array, zip(*lines, strict=True))
-        none, number = np.full(len(lines), np.nan), np.full(len(lines), fold, dtype=np.int64)
+            table, at_ns = data.tables[one.place], np.append(one.t_ns[:1], onset)
+            last = np.searchsorted(np.rint(table.time_s * 1e9), at_ns, side="right") - 1
+            rows = table.row[np.maximum(last, 0)]
+            columns.append(
+                (np.sign(np.arange(len(at_ns))), np.append(0.0, share), np.full(len(at_ns), one.place), rows, at_ns)
+            )
+        true, hits, place, row, at_ns = map(np.concatenate, zip(*columns, strict=True))
+        none, number = np.full(len(true), np.nan), np.full(len(true), fold, dtype=np.int64)
         return Answers(true, hits, place, row, number, at_ns * 1e-9, none)
 
     def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
