@@ -30,7 +30,6 @@ from tactbench.core.evaluation.delay import (
 from tactbench.core.evaluation.event_answers import EventRules, state_figures
 from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
 from tactbench.core.evaluation.folds import TaskData, load_task
-from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
@@ -45,7 +44,7 @@ from tactbench.core.evaluation.splits import (
     used_rows,
     without_part,
 )
-from tactbench.core.evaluation.summaries import with_windows
+from tactbench.core.evaluation.summaries import band_limit, clocked, with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers

@@ -10,10 +10,16 @@ import numpy as np
 
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.folds import TaskData
-from tactbench.core.evaluation.frames import frame_features, frame_times, slip_target
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
-from tactbench.core.evaluation.summaries import is_summarised, kept, recording_features
+from tactbench.core.evaluation.summaries import (
+    frame_features,
+    frame_times,
+    is_summarised,
+    kept,
+    recording_features,
+    slip_target,
+)
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta

@@ -10,9 +10,9 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.frames import slip_target
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.slip_reference import SlipReference
+from tactbench.core.evaluation.summaries import slip_target
 from tactbench.core.events.alarms import (
     EventScores,
     GroundTruth,
@@ -149,7 +149,7 @@ class EventRules:
             )
         true, hits, place, row, at_ns = map(np.concatenate, zip(*columns, strict=True))
         none, number = np.full(len(true), np.nan), np.full(len(true), fold, dtype=np.int64)
-        return Answers(true, hits, place, row, number, at_ns * 1e-9, none)
+        return Answers(true, hits, place, row, number, np.asarray(at_ns * 1e-9, dtype=np.float64), none)
 
     def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
         """Return what is said of the events of all test recordings; what cannot be said is not there.

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, wrong
 from tactbench.core.evaluation.dataset import Dataset, load_dataset, thinned
-from tactbench.core.evaluation.frames import framed
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
 from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
 from tactbench.core.evaluation.splits import (
@@ -24,7 +23,7 @@ from tactbench.core.evaluation.splits import (
     make_splits,
     with_validation,
 )
-from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
+from tactbench.core.evaluation.summaries import framed, is_summarised, summarised, with_windows
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.row import LEAKS

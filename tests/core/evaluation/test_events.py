@@ -7,9 +7,8 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.frames import frame_features, frame_times, framed
 from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.summaries import summary_of
+from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
 from tactbench.core.spec.events import AREA_PER_MINUTE
