@@ -164,7 +164,7 @@ def answered_fold(
 
 
 def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
-    """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
+    """Return the answers to rows, combined where a recording has one answer, with the reference force."""
     if made.vote:
         part, predicted = voted(part, predicted, len(made.classes))
     forces = [np.full(len(one.row), np.nan) if one.force is None else one.force for one in made.tables]

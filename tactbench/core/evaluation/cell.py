@@ -67,7 +67,7 @@ class CellContext:
     protocol: str
     """how recordings become X and y"""
     split: str | OwnSplit | None
-    """what is kept apart; None: the task's first that fits"""
+    """name of the split; None: the task's first that the recordings can serve"""
     seed: int
     """seed of everything random: the same seed gives the same score in any process"""
     clock: Clock
@@ -96,7 +96,7 @@ class Result(Evaluated):
 
 
 def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
-    """Load the recordings of a cell (files, or what was read of them) and evaluate its estimator on them.
+    """Load the recordings of a cell (files, or a data set read from them) and evaluate its estimator on them.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def _result(
         ci_low=interval.low,
         ci_high=interval.high,
         ci_method=interval.method,
-        # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
+        # R² of labels that never change is undefined and left out: NaN is no JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
         n_recordings=len(took_part),
         n_sessions=len({meta.session for meta in took_part}),
@@ -283,7 +283,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
-    """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
+    """Return the recordings that some fold uses, counts of those that none uses, and stamps."""
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
@@ -311,7 +311,7 @@ def _of_answers(data: TaskData) -> list[str]:
 
 
 def _incomplete(recorded: Dataset) -> list[str]:
-    """Return how many incomplete recordings were left out or taken, and why they are incomplete."""
+    """Return stamps of incomplete recordings that were left out or taken, with the reasons."""
     start = "recordings left out ("
     out = {name[len(start) : -1]: n for name, n in recorded.counts.items() if name.startswith(start + INCOMPLETE)}
     taken = [meta.excluded for meta in recorded.metas if meta.excluded]
@@ -321,7 +321,7 @@ def _incomplete(recorded: Dataset) -> list[str]:
 
 
 def _groups_alike(data: TaskData) -> Iterator[str]:
-    """Yield labels that the split keeps apart as two, and that are probably one."""
+    """Yield labels of the split's groups that are probably one although they differ."""
     name = data.assignments[0].groups
     tables = [table.groups[name] for table in data.data.tables if name in table.groups]
     return alike(f"values of {name}", sorted({str(one) for table in tables for one in np.unique(table)}))

@@ -1,4 +1,4 @@
-"""How late an answer is, from a change at the skin to the answer that knows of it, part by part; what calls take."""
+"""The delay from a change at the skin to the answer that reflects it, part by part, and the duration of calls."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Clock = Callable[[], float]
 """Seconds, monotonic."""
 
 RATE_TOLERANCE = 0.01
-"""Relative difference of rates beyond which a remark says so: rates are stated to two or three digits."""
+"""Relative difference of rates that is remarked: rates are stated to two or three digits."""
 
 SLOWEST_S = 1.0
 """Interval beyond which rows are single readings, such as one a press, which have no sampling interval (assumed)."""
@@ -102,7 +102,7 @@ def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[
             sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stated_hz
             own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz)
             own_hz = own_hz / rules.every if own_hz else sampled_hz
-            # A rig may record a sensor at a rate below its own; where none says so, a clock outweighs what is stated.
+            # A rig may record a sensor below its own rate; unless the rig states that, the clock outweighs the spec.
             slower = sampled_hz and own_hz and sampled_hz < (1 - RATE_TOLERANCE) * own_hz
             waited_hz = sampled_hz if slower and stream.name not in meta.own_rates_hz else own_hz
             waits_ms.append(1e3 / waited_hz if waited_hz else None)
@@ -235,7 +235,7 @@ def calls_s(
     clock: Clock,
     at_most: int = AT_MOST,
 ) -> FloatArray:
-    """Return (calls,) seconds of `work` on what is `given` for places spread over `rows`."""
+    """Return (calls,) seconds of `work` on the values that `given` has for places spread over `rows`."""
     places = np.linspace(0, rows - 1, at_most).astype(int)
     work(given(places[0]))  # the first call of a library takes longer
     spent: list[float] = []

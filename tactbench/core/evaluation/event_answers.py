@@ -1,4 +1,4 @@
-"""From a detector's score a frame to alarms, to what they hit, and to the figures of a row."""
+"""Alarms from a detector's score of each frame, the events that they hit, and the figures of a row."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec
 
 OTHER_SCALES = {0.5: "halved", 2.0: "doubled"}
-"""Of the label thresholds."""
+"""Other scales of the label thresholds, and their words."""
 BOUNDS_PER_MINUTE = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""False alarms a minute on validation recordings, at each of which a threshold is chosen to show what latency costs."""
+"""False alarms a minute on validation recordings; a threshold is chosen for each bound to show the cost of latency."""
 
 
 class Scored(NamedTuple):
@@ -45,7 +45,7 @@ class Scored(NamedTuple):
     reference: SlipReference
 
     def truth(self, scale: float = 1.0) -> GroundTruth:
-        """Return what happened, under thresholds of labels times `scale`; no event before the first frame counts."""
+        """Return the events, under label thresholds times `scale`; none before the first frame counts."""
         span = int(self.t_ns[0]), int(self.t_ns[-1]) + 1
         events = self.reference.labels[scale].gross_ns
         events = events[(events[:, 0] >= span[0]) & (events[:, 0] < span[1])]
@@ -53,7 +53,7 @@ class Scored(NamedTuple):
 
 
 class Detected(NamedTuple):
-    """A test recording, and what raises its alarms."""
+    """A test recording, and the thresholds of its alarms."""
 
     scored: Scored
     threshold: float
@@ -63,7 +63,7 @@ class Detected(NamedTuple):
 
 @dataclass(frozen=True)
 class EventRules:
-    """How a detector's scores become alarms, and what is counted of these."""
+    """The rules by which a detector's scores become alarms, and alarms become figures."""
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
@@ -122,7 +122,7 @@ class EventRules:
         )
 
     def items(self, several: Sequence[Scored], curve: ThresholdCurve, data: Dataset, fold: int) -> Answers:
-        """Return what the area is a mean over: each event, with the share of the rates at which it is hit.
+        """Return the summands of the area: each event, with the share of the rates at which it is hit.
 
         A line of each recording, which is no event, stands before its events, so that each recording has a part in the
         interval. The row is the last frame before the onset, the time that of the onset.
@@ -152,7 +152,7 @@ class EventRules:
         return Answers(true, hits, place, row, number, np.asarray(at_ns * 1e-9, dtype=np.float64), none)
 
     def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
-        """Return what is said of the events of all test recordings; what cannot be said is not there.
+        """Return figures of the events of all test recordings, without those that are undefined.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class EventRules:
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
     def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> list[dict[str, float]]:
-        """Return what test recordings say at thresholds that validation chose for several bounds of false alarms."""
+        """Return figures of test recordings at thresholds chosen on validation for several bounds of false alarms."""
         found = []
         for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else ()):
             scores = self._scores([one._replace(threshold=one.bounds[number]) for one in tested])

@@ -1,4 +1,4 @@
-"""Estimators are made, fitted and asked to predict; their hyper-parameters are chosen on data of neither kind."""
+"""Estimators are made, fitted and used; their hyper-parameters are chosen on data of neither training nor test."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
 
 
 def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Callable[[Part], Any]]:
-    """Return what makes of a training set what ``fit`` of an object is given beside it, by scikit-learn's names.
+    """Return functions from a training set to further parameters of an object's ``fit``, by scikit-learn's names.
 
     `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
     the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
@@ -166,7 +166,7 @@ def answers_to(part: Part, model: Estimator, descriptor: EstimatorDescriptor, n_
 
 
 def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
-    """Return the last row of each recording, and what the (n,) answers to its rows come to.
+    """Return the last row of each recording, and its answer, combined from the (n,) answers to its rows.
 
     That is the commonest class, of equals the first; where `n_classes` is 0, the mean. Rows are in order of recording
     and time.
@@ -192,7 +192,7 @@ class Choice:
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
-    """Return what the estimator may look at."""
+    """Return the features that the estimator may look at."""
     if descriptor.looks_at == "time":
         return one.row.astype(np.float64)[:, None]
     if descriptor.looks_at == "nothing":
@@ -212,8 +212,8 @@ def select(
 ) -> Choice | None:
     """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
 
-    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts` is
-    told which fits came with a warning.
+    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts`
+    gets the fits with a warning.
     """
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:

@@ -30,12 +30,12 @@ from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
-"""What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
+"""The descriptor of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
 
 
 @dataclass(frozen=True, repr=False)
 class TaskData:
-    """What a task asks of recordings under a protocol: rows, and which of them train and test.
+    """The rows of a task under a protocol, and which of them train and test.
 
     `X` is tared, and neither scaled nor filtered: these are fitted on each fold's training rows.
     """
@@ -50,11 +50,11 @@ class TaskData:
     assignments: tuple[Assignment, ...]
     """which rows of each recording are for what, fold by fold"""
     held_back: bool = False
-    """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+    """thresholds are chosen on a share of the training groups: no recording has the role validation"""
     unit: str | None = "session"
     """name of the groups that are held out, which intervals are over; None: the caller's own split names none"""
     stamps: tuple[str, ...] = ()
-    """what the caller's own split gives away"""
+    """leaks of the caller's own split"""
     window: int = 0
     """rows of a window; 0: rows are answered one by one"""
 
@@ -64,7 +64,7 @@ class TaskData:
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features), of windows (n, window, features), of the rows that are asked for and have a label."""
+        """Return (n, features), or (n, window, features), of the labelled rows that the protocol keeps."""
         return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
 
     @property
@@ -80,7 +80,7 @@ class TaskData:
 
     @property
     def feature_names(self) -> tuple[str, ...]:
-        """Return what the columns of `X` are called."""
+        """Return the names of the columns of `X`."""
         return self.data.features
 
     @property
@@ -140,9 +140,9 @@ def load_task(
     Parameters
     ----------
     recordings
-        Files, or what was read of them already.
+        Files, or a data set read from them.
     split
-        What is kept apart; None: the task's first that the recordings can serve.
+        Name of the split; None: the task's first that the recordings can serve.
     estimator
         Decides the features of frames, the gap between training and test where recordings are cut in time (its longest
         window), and whether a threshold has to be chosen.
@@ -154,7 +154,7 @@ def load_task(
     Raises
     ------
     NotApplicable
-        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's. If the
+        If the estimator looks at the time and a recording states none: the order of its rows means nothing. If the
         protocol thins samples or states a window, and the task is not answered sample by sample.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)

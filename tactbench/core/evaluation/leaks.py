@@ -31,7 +31,7 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
     X, y = (np.concatenate([getattr(one, name)[one.labelled] for one in data.tables]) for name in ("X", "y"))
     recording = np.repeat(np.arange(len(data.tables)), [one.labelled.sum() for one in data.tables])
     parts = [*y.reshape(len(y), -1).T]
-    parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square does not tell the sign
+    parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square loses the sign
     channels = zip(data.features, X.T, strict=True)
     found = [name for name, column in channels if any(is_copy(column, part, recording) for part in parts)]
     return (f"{LEAKS}{', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
@@ -71,7 +71,7 @@ def _learned(fold: Assignment) -> tuple[Mask, ...]:
 
 
 def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
-    """Return a stamp if rows that stand each for itself, since no clock orders them, stand on both sides of a split."""
+    """Return a stamp if rows without a clock, each a reading by itself, stand on both sides of a split."""
     if not all(one.meta.clock == "none" or len(one.row) == 1 for one in data.tables):
         return ()
     mixed = [_mixed(one.X, one.force, *([] if data.classes else [one.y])) for one in data.tables]

@@ -1,8 +1,8 @@
-"""What was repeated, and what a row keeps of it, so that scores can be compared later without the answers.
+"""The replicates of a row: sums by which scores can be compared later without the answers.
 
 ::
 
-    {"unit": "session",                  what a replicate is
+    {"unit": "session",                  word for a replicate
      "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
      "sums": [[…], …]                    the metric's summands over each replicate
@@ -49,7 +49,7 @@ def summed(
     floor: Floor | None = None,
     truth: FloatArray | None = None,
 ) -> dict[str, Any]:
-    """Return what a row keeps of its replicates; `truth` is the force that was exerted, (n,), where it is known."""
+    """Return the replicates of a row; `truth` is the force that was exerted, (n,), where it is known."""
     strata = unit.strata(tested.y_true, n_classes)
     kept = {"unit": unit.name, "names": list(unit.labels), "strata": strata.tolist() if strata.any() else None}
     if metric.function is not None:

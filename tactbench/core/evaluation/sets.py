@@ -1,4 +1,4 @@
-"""From masks to X and y: what the protocol tares, discards, scales and filters."""
+"""From masks to X and y: rows are tared, discarded, scaled and filtered as the protocol has it."""
 
 from __future__ import annotations
 
@@ -99,9 +99,9 @@ class SetRows(Part):
 
 
 def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> SetRows:
-    """Collect the rows of a set, one (n,) mask a recording, and drop what the protocol drops.
+    """Return the rows of a set that the protocol keeps; `masks` has one (n,) mask for each recording.
 
-    `counts` is told how many rows the three-sigma rule drops, which depends on the set, and messages say `what` it is.
+    `counts` gets the number of rows that the three-sigma rule drops; `what` names the set in messages.
     """
     tables = data.tables
     chosen = [mask & asked_for(table, protocol) for table, mask in zip(tables, masks, strict=True)]
@@ -220,7 +220,7 @@ def apart(fold: Assignment, window: int, step: int) -> Assignment:
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
     """Return X and y of one fold: kept, scaled and filtered over `k` + 1 samples as the protocol has it.
 
-    `counts` is told what was left out, and which features never change.
+    `counts` gets the rows left out, and the features that never change.
     """
     train = keep(data, rules, assignment.train, "training", counts)
     for name, width in zip(data.features, np.ptp(train.X, axis=tuple(range(train.X.ndim - 1))), strict=True):

@@ -1,4 +1,4 @@
-"""What is kept apart between training and test."""
+"""Splits: which rows train, validate and test, and the groups that these do not share."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SHUFFLED_WHOLE_STAMP = f"{LEAKS}split shuffled deals recordings at random, of on
 
 @dataclass(frozen=True)
 class Assignment:
-    """Which rows of each recording are for what."""
+    """The rows of each recording that train, test and validate."""
 
     name: str
     train: tuple[Mask, ...]
@@ -61,7 +61,7 @@ class OwnSplit:
 
     @property
     def name(self) -> str:
-        """What rows and tables call it."""
+        """The name in rows and tables."""
         if isinstance(self._splitter, list):
             return f"{len(self._splitter)} given folds"
         return " ".join(repr(self._splitter).partition(" object at 0x")[0].split())
@@ -71,7 +71,7 @@ class OwnSplit:
         if not self._folds:
             given: Any = self._splitter
             try:
-                with warnings.catch_warnings():  # such groups tell what intervals are over
+                with warnings.catch_warnings():  # such groups are the units of intervals
                     warnings.filterwarnings("ignore", "The groups parameter is ignored")
                     pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
@@ -248,7 +248,7 @@ def _masks(data: Dataset, chosen: Callable[[int, Table], Mask | bool]) -> tuple[
 
 
 def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
-    """Return the official sets; of few shots the first `number` training sessions alone, without validation."""
+    """Return the official sets; of few shots only the first `number` training sessions, without validation."""
     train, validation, test = (
         tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
         for role in ("train", "validation", "test")
@@ -283,7 +283,7 @@ def _cut_in_time(
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
-    """Say in the name of a fold that tests one single number whether training had any on both sides of it."""
+    """Add to the name of a fold that tests one single number whether training had numbers on both sides of it."""
     if data.classes or any(table.y.ndim > 1 for table in data.tables):
         return fold
     train, test = (
@@ -397,7 +397,7 @@ def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counte
 
 
 def over_rows(assignment: Assignment, made: Dataset, recorded: Dataset) -> Assignment:
-    """Return an assignment of what recordings were made to as one of all rows recorded.
+    """Return an assignment of derived rows (frames, windows) as one of all rows recorded.
 
     Of windows their last rows; all rows of a recording that was made to frames, or to one row.
     """

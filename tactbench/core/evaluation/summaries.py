@@ -34,12 +34,12 @@ Features = Mapping[str, float]
 
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
-    """Tell whether a recording becomes one row; a first row alone is one already."""
+    """Return whether a recording becomes one row of summaries; under a first-row protocol it is one already."""
     return task.answer_per == "recording" and bool(task.summaries or task.features_by) and not rules.first_row_only
 
 
 def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
-    """Return each recording as one row of features, what the protocol drops left out; `data` where none are asked for.
+    """Return each recording as one row of features of the samples that the protocol keeps; `data` without summaries.
 
     The row stands where the recording ends: it is the first at which the answer can be known.
     """
@@ -76,7 +76,7 @@ def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: Protocol
 
 
 def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table], Features]:
-    """Return what makes the features of one recording; the task's own code is imported here."""
+    """Return the function to one recording's features; the task's own code is imported here."""
     own = load_object(task.features_by) if task.features_by else None
 
     def compute(table: Table) -> Features:
@@ -105,7 +105,7 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
 
 
 def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
-    """Return which channels of a stream a summary is of."""
+    """Return the columns of a stream that a summary is of."""
     return [place for place, kind in enumerate(stream.kinds) if not summary.kinds or kind in summary.kinds]
 
 
@@ -195,7 +195,7 @@ def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
 
 
 def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recording: str) -> FloatArray:
-    """Return what a causal band-pass leaves of a stream, at rest at its first sample; all of it without a band."""
+    """Return a stream after a causal band-pass, at rest at its first sample; without a band, as it is."""
     if band_hz is None:
         return stream.data
     if stream.rate_hz is None:
@@ -240,7 +240,7 @@ def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: Estima
 def frame_features(
     task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
 ) -> Callable[[Table, IntArray], FrameFeatures]:
-    """Return what makes the features of all frames of one recording; a detector's own code is imported here."""
+    """Return the function to the features of all frames of a recording; a detector's own code is imported here."""
     target = slip_target(task)
     own = load_object(estimator.frames_by) if estimator.frames_by else None
     summaries = estimator.summaries or task.summaries
@@ -282,7 +282,7 @@ def frame_features(
 
 
 def band_limit(streams: Sequence[StreamReadings]) -> str:
-    """Return what the fastest stream cannot show."""
+    """Return the limit of the fastest stream as text."""
     one = fastest(streams)
     return f"band not observable above {(one.rate_hz or 0.0) / 2:.4g} Hz, half the rate of {one.stream}"
 
@@ -309,7 +309,7 @@ def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
 def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
     """Return (n,) when the frames of a recording end, ns since the first row of the sensor's clock.
 
-    They are all that all streams fill, after the hold where it is dropped.
+    Every stream has samples throughout each frame; the hold is left out where the protocol drops it.
     """
     target = slip_target(task)
     streams = clocked(table, rules)

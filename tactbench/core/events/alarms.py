@@ -101,7 +101,7 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """What happened in one recording."""
+    """The events of one recording."""
 
     event_ns: IntArray
     """(e, 2) onset and end of each event [ns]."""
@@ -113,9 +113,9 @@ class GroundTruth:
 
 @dataclass(frozen=True)
 class EventScores:
-    """Counts and latencies over all events of some recordings, and what follows from them.
+    """Counts and latencies over all events of some recordings, and the scores that follow from them.
 
-    The shape (...) is () for one set of alarms and (k,) for k thresholds. NaN is "cannot be said": precision without an
+    The shape (...) is () for one set of alarms and (k,) for k thresholds. NaN is undefined: precision without an
     alarm, recall without an event, a rate without seconds, a latency without a hit.
     """
 
@@ -231,7 +231,7 @@ def displacement_at_detection(
 def time_base(truth: GroundTruth, policy: AlarmPolicy, t_ns: IntArray) -> tuple[IntArray, int]:
     """Return (n,) which times lie where false alarms are counted, 0 or 1, and how long that is in all [ns].
 
-    That is what the policy names, without every event and its window: half-open stretches between neighbouring edges.
+    It is the time that the policy names, without every event and its window: half-open stretches between edges.
     """
     named = truth.disturbance or policy.false_alarm_time == "non-events"
     begin, close = truth.span_ns

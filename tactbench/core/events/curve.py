@@ -20,7 +20,7 @@ from tactbench.core.spec.events import AlarmPolicy
 
 @dataclass(frozen=True)
 class ScoredRecording:
-    """A detector's score over one recording, and what happened in it."""
+    """A detector's score over one recording, and the recording's events."""
 
     t_ns: IntArray
     """(n,) when each score is known, the detector's compute time included [ns]."""

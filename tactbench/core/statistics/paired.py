@@ -48,7 +48,7 @@ class PairableRows:
 def together(rows: Sequence[Row]) -> list[PairableRows]:
     """Return finished rows of one metric in groups of equal replicates; rows without usable ones are in none.
 
-    The influence of a replicate is what leaving it out changes (:func:`influences`).
+    The influence of a replicate is the change of the score without it (:func:`influences`).
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
@@ -77,7 +77,7 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
 
 
 def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
-    """Return (replicates,) scores that a row keeps of its replicates: of `metric`, or of what is beyond the floor."""
+    """Return (replicates,) scores that a row keeps of its replicates: of `metric`, or beyond the floor."""
     return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
@@ -114,17 +114,12 @@ def difference(first: Row, second: Row) -> Difference:
 
     Notes
     -----
-    Where both were tested on replicates of the same names, differences are taken replicate by replicate. The interval
-    is Student's, with the jackknife's standard error of the difference of scores over replicates (Efron and Stein 1981;
-    Cameron, Gelbach and Miller 2008 on t with few clusters), which widens by itself where there are few. The p-value is
-    that of exchanging the two answers within replicates, each way as likely as another if there is no difference: all
-    2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
-    replicates it cannot be below 2 / 2^n.
-
-    Where each replicate has a score of its own, the difference is that of the means over replicates; of errors of force
-    that have a floor, of what is beyond it.
-
-    Where the replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
+    Where both were tested on replicates of the same names, differences are taken replicate by replicate, by the
+    jackknife's standard error (Efron and Stein 1981; Cameron, Gelbach and Miller 2008 on t with few clusters). The
+    p-value is that of exchanging the two answers within replicates: all 2^n ways up to 12 replicates, else 9,999 drawn
+    (Phipson and Smyth 2010 on counting the observed one). Where each replicate has a score of its own, the difference
+    is that of the means over replicates; of errors of force that have a floor, of the errors beyond it. Where the
+    replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
 
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
@@ -261,7 +256,7 @@ def _share(apart: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class FoldDifference:
-    """The mean difference over folds, and what can be said of it."""
+    """The mean difference over folds, with its interval and p-value."""
 
     mean: float
     low: float

@@ -1,4 +1,4 @@
-"""One row a cell: what its replicates came to, in place of a row for each."""
+"""One row for each cell, in place of a row for each replicate."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
         In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
         interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and of a
         single campaign whose split holds out five units, the replicates are what is held out, and the row's own
-        interval stays; of several seeds asked of the same recordings the one with the median score stands for all.
-        Times are medians over what one host measured. Recordings, answers and key are those of the first replicate.
+        interval stays; of several seeds on the same recordings the one with the median score stands for all.
+        Times are medians over the runs of one host. Recordings, answers and key are those of the first replicate.
 
     Notes
     -----
@@ -94,7 +94,7 @@ def _true(row: Row) -> Row:
 
 
 def against_reference(row: Row) -> Row:
-    """Return a row whose score is against the reference as it was recorded: what a published error of force is."""
+    """Return a row whose score is against the reference as it was recorded, as published errors of force are."""
     if row.get("reference_score") is None:
         return row
     return {
@@ -185,7 +185,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
-    """Return what is kept of each replicate, by which cells are compared."""
+    """Return the scores of each replicate, by which cells are compared."""
     kept: dict[str, Any] = {
         "unit": "replicate",
         "names": [str(row["seed"]) for row in done],
@@ -199,7 +199,7 @@ def _kept(done: Sequence[Row]) -> dict[str, Any]:
 
 
 def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the row of a cell whose replicates are what its split holds out; of several seeds the median one's.
+    """Return the row of a cell whose replicates are the units its split holds out; of several seeds the median one's.
 
     A row that does not keep their own scores has an interval over something else, and loses it.
     """
@@ -232,7 +232,7 @@ def _median(values: Sequence[Any]) -> float | None:
 
 
 def _chosen(done: Sequence[Row]) -> dict[str, Any]:
-    """Return what was chosen on validation data: of what replicates chose, the lower median."""
+    """Return the values chosen on validation data: the lower median over replicates."""
     names = dict.fromkeys(name for row in done for name in row["chosen"])
     return {name: median_low([row["chosen"][name] for row in done if name in row["chosen"]]) for name in names}
 
@@ -273,7 +273,7 @@ def median_interval(values: Sequence[Any]) -> MedianInterval | None:
     The interval between the k-th smallest and the k-th largest of n values holds the median with probability
     ``1 - 2 P(B < k)``, B binomial with n and 1/2, whatever the distribution is. Between the two k whose probabilities
     enclose 95 % the ends are interpolated [1]_: 95 % are covered of smooth distributions, of any continuous one no less
-    than :func:`least_coverage`. The range of five values holds it in 93.75 % only: the level says so.
+    than :func:`least_coverage`. The range of five values holds it in 93.75 % only, which is its level.
 
     References
     ----------
@@ -296,7 +296,7 @@ def median_interval(values: Sequence[Any]) -> MedianInterval | None:
 
 
 def least_coverage(n: int) -> float:
-    """Return what the interval of a median of `n` values, five or more, covers at least, of any distribution."""
+    """Return the least coverage of the interval of a median of `n` values, five or more, over all distributions."""
     return _coverage(n, 1) if n == FEWEST else _coverage(n, _depth(n) + 1)
 
 
@@ -317,7 +317,7 @@ def count_range(counts: Sequence[int], unit: str) -> str:
 
 
 def percent(n: int | None, unit: str | None) -> str:
-    """Return what intervals over `n` replicates, or sessions, cover, as text: ``95 %``."""
+    """Return the coverage of intervals over `n` replicates, or sessions, as text: ``95 %``."""
     return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"
 
 
