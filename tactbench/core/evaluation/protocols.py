@@ -75,7 +75,7 @@ DEPLOYABLE = ProtocolSpec(
     scaled_by="training set",
     window_over="consecutive samples",
 )
-"""As a sensor in use: tared before a press, no statistic of the test set, causal windows, no row dropped by its label."""
+"""As a sensor in use: tared before a press, no statistic of the test set, causal windows, no row dropped by label."""
 
 DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
     update={
