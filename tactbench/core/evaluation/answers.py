@@ -97,12 +97,12 @@ def fitted_fold(
             hint="Choose another split, or check the label column with `tactbench inspect`.",
         )
     if made.vote:
-        for place, (table, mask) in enumerate(zip(made.tables, assignment.test, strict=True)):
-            if place not in fold.test.recording and (mask & table.labelled).any():
-                raise DataError(
-                    f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
-                    hint="Use protocol `deployable-untared`, or leave the recording out.",
-                )
+        lost = np.setdiff1d(made.recording[assignment.test & made.labelled], fold.test.recording)
+        if lost.size:
+            raise DataError(
+                f"The protocol leaves no row of recording {made.metas[lost[0]].name!r}, which has one answer.",
+                hint="Use protocol `deployable-untared`, or leave the recording out.",
+            )
     X = features_of(fold.train, descriptor)
     more = {name: of(fold.train) for name, of in estimator.fit_params.items()}
     model = estimator.build(choice.params if choice else {})
@@ -167,7 +167,6 @@ def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -
     """Return the answers to rows, combined where a recording has one answer, with the reference force."""
     if made.vote:
         part, predicted = voted(part, predicted, len(made.classes))
-    forces = [np.full(len(one.row), np.nan) if one.force is None else one.force for one in made.tables]
-    force = at_rows(made.tables, forces, part)
+    force = at_rows(made, made.column(lambda table: np.nan if table.force is None else table.force), part)
     fold = np.full(len(part), number, dtype=np.int64)
     return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)

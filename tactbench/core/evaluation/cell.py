@@ -287,7 +287,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
-    took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
+    took_part = [recorded.metas[place] for place in np.unique(recorded.recording[used & recorded.labelled]).tolist()]
     if data.split != "shuffled":
         stamps = (*data.stamps, *leak_stamps(recorded, folds))
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
+Mask = npt.NDArray[np.bool_]
 MUCH = 0.05
 """Share of the rows left out from which on it stands beside the score."""
 MOST_NAMED = 4
@@ -104,17 +105,40 @@ class Dataset:
     """That answer is combined from those of the recording's rows"""
 
     @property
+    def labelled(self) -> Mask:
+        """(rows,) whether a row has a label, of all recordings one after the other."""
+        return self.column(lambda table: table.labelled)
+
+    @property
+    def recording(self) -> IntArray:
+        """(rows,) the recording of each row."""
+        return np.repeat(np.arange(len(self.tables)), [len(table.row) for table in self.tables])
+
+    def column(self, of: Callable[[Table], Any], rows: Mask | None = None) -> npt.NDArray[Any]:
+        """Return (n, …) values of all rows, or of some: `of` gives one value for each recording, or for each row."""
+        masks: Sequence[Any] = [...] * len(self.tables) if rows is None else self.parted(rows)
+        found = []
+        for table, mask in zip(self.tables, masks, strict=True):
+            value = of(table)
+            found.append(np.broadcast_to(value, (len(table.row), *np.shape(value)[1:]))[mask])
+        return np.concatenate(found)
+
+    def parted(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Return values of all rows recording by recording."""
+        return np.split(column, np.cumsum([len(table.row) for table in self.tables])[:-1])
+
+    @property
     def metas(self) -> tuple[RecordingMeta, ...]:
         """The recordings' metadata, in order."""
         return tuple(table.meta for table in self.tables)
 
 
-def at_rows(tables: Sequence[Table], columns: Sequence[npt.NDArray[Any]], rows: Part | Answers) -> npt.NDArray[Any]:
-    """Return (m, …) values at the rows of a set, of columns (n, …), one for each recording."""
-    found = np.empty((len(rows), *columns[0].shape[1:]), dtype=np.result_type(*columns))
+def at_rows(data: Dataset, column: npt.NDArray[Any], rows: Part | Answers) -> npt.NDArray[Any]:
+    """Return (m, …) values at the rows of a set, of (n, …) values of all rows."""
+    found, columns = np.empty((len(rows), *column.shape[1:]), dtype=column.dtype), data.parted(column)
     for place in np.unique(rows.recording):
         mine = rows.recording == place
-        found[mine] = columns[place][np.searchsorted(tables[place].row, rows.row[mine])]
+        found[mine] = columns[place][np.searchsorted(data.tables[place].row, rows.row[mine])]
     return found
 
 

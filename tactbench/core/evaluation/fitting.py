@@ -119,7 +119,7 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
             value = data.per_row(f"params[{name!r}]", value)
         if isinstance(value, str) or np.shape(value)[:1] != data.y.shape[:1]:
             return lambda _: value
-        return partial(at_rows, data.data.tables, data.spread(np.asarray(value)))
+        return partial(at_rows, data.data, data.spread(np.asarray(value)))
 
     if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
         routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)

@@ -36,7 +36,7 @@ def replicates(data: Dataset, name: str | None, tested: Answers) -> ReplicateUni
     """Return which unit of replication of that name every test row belongs to; None: all rows are one."""
     if name is None:
         return ReplicateUnits("", np.zeros(len(tested), dtype=np.int64), ("",))
-    values = at_rows(data.tables, [table.groups[name] for table in data.tables], tested)
+    values = at_rows(data, data.column(lambda table: table.groups[name]), tested)
     labels, codes = np.unique(values, return_inverse=True)
     return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
