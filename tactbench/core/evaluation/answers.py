@@ -1,6 +1,6 @@
-"""From folds to answers: models fitted to the training rows of each fold, and what they answer to its test rows.
+"""From folds to answers: models fitted to the training rows of each fold, and their answers to its test rows.
 
-Regression, classification and events differ here in what is scored of a fold (:func:`answered_fold`).
+Regression, classification and events differ here in what of a fold is scored (:func:`answered_fold`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, at_rows
 from tactbench.core.evaluation.delay import Clock
 from tactbench.core.evaluation.event_answers import Detected, EventRules
-from tactbench.core.evaluation.fitting import Build, Choice, answers, asked, features_of, fit, select, voted
+from tactbench.core.evaluation.fitting import Build, Choice, answers_to, features_of, fit, select, voted
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.sets import prepared
@@ -30,14 +30,14 @@ from tactbench.core.spec.scene import Role
 
 @dataclass(frozen=True)
 class Configured:
-    """An estimator, what is known of it, and how it is made."""
+    """An estimator: its descriptor, how it is made, and parameters of the user."""
 
     descriptor: EstimatorDescriptor
     build: Build
     params: Mapping[str, Any] = field(default_factory=dict)
     """fixed by the user: they are not searched"""
     fit_params: Mapping[str, Callable[[Part], Any]] = field(default_factory=dict)
-    """what else its ``fit`` takes, of a training set"""
+    """other parameters of its ``fit``, as functions of a training set"""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FittedFold:
     fold: Fold
     model: Estimator
     choice: Choice | None
-    """what was chosen on validation data; None: there was nothing to choose"""
+    """parameters that were chosen on validation data; None: there was nothing to choose"""
     k: int
     """rows that the mean filter looks back"""
     search_s: float
@@ -56,7 +56,7 @@ class FittedFold:
 
 @dataclass(frozen=True)
 class AnsweredFold:
-    """What was answered in one fold, and what it took."""
+    """The answers of one fold, and their cost."""
 
     name: str
     choice: Choice | None
@@ -97,13 +97,12 @@ def fitted_fold(
             hint="Choose another split, or check the label column with `tactbench inspect`.",
         )
     if made.vote:
-        answerable = set(fold.test.recording.tolist())
-        for place, (table, mask) in enumerate(zip(made.tables, assignment.test, strict=True)):
-            if place not in answerable and (mask & table.labelled).any():
-                raise DataError(
-                    f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
-                    hint="Use protocol `deployable-untared`, or leave the recording out.",
-                )
+        lost = np.setdiff1d(made.recording[assignment.test & made.labelled], fold.test.recording)
+        if lost.size:
+            raise DataError(
+                f"The protocol leaves no row of recording {made.metas[lost[0]].name!r}, which has one answer.",
+                hint="Use protocol `deployable-untared`, or leave the recording out.",
+            )
     X = features_of(fold.train, descriptor)
     more = {name: of(fold.train) for name, of in estimator.fit_params.items()}
     model = estimator.build(choice.params if choice else {})
@@ -124,19 +123,18 @@ def answered_fold(
     """Have a model answer its fold; validation and training answers are kept where the fold is the only one."""
     fold, made = fitted.fold, data.data
     n_classes = 0 if rules else len(made.classes)
-    X, shape = features_of(fold.test, descriptor), fold.test.y.shape[1:]
     began = clock()
-    predicted = answers(fitted.model, X, descriptor.name, n_classes, shape)
+    predicted = answers_to(fold.test, fitted.model, descriptor, n_classes)
     predict_s = clock() - began
     given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {"test": (fold.test, predicted)}
     if fold.validation is not None and len(fold.validation):
-        given["validation"] = fold.validation, asked(fitted.model, fold.validation, descriptor, n_classes)
-    alone = len(data.assignments) == 1
-    if alone and not made.classes:
-        given["train"] = fold.train, asked(fitted.model, fold.train, descriptor, 0)
+        given["validation"] = fold.validation, answers_to(fold.validation, fitted.model, descriptor, n_classes)
+    single = len(data.assignments) == 1
+    if single and not made.classes:
+        given["train"] = fold.train, answers_to(fold.train, fitted.model, descriptor, 0)
     detected: tuple[Detected, ...] = ()
     if rules is None:
-        sets = {role: _rows(*one, made, number) for role, one in given.items()}
+        sets: dict[Role, Answers] = {role: _rows(*one, made, number) for role, one in given.items()}
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
         curves = {role: rules.curve(several) for role, several in scored.items()}
@@ -145,9 +143,8 @@ def answered_fold(
         sets = {
             role: rules.items(several, curves[role], made, number)
             for role, several in scored.items()
-            if role == "test" or alone
+            if role == "test" or single
         }
-    kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
     scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
     untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []
     return AnsweredFold(
@@ -161,16 +158,15 @@ def answered_fold(
         fit_s=fitted.fit_s,
         predict_s=predict_s,
         batch_rows=len(fold.test),
-        sets=kept,
+        sets=sets if single else {"test": sets["test"]},
         detected=detected,
     )
 
 
 def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
-    """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
+    """Return the answers to rows, combined where a recording has one answer, with the reference force."""
     if made.vote:
         part, predicted = voted(part, predicted, len(made.classes))
-    forces = [np.full(len(one.row), np.nan) if one.force is None else one.force for one in made.tables]
-    force = at_rows(made.tables, forces, part)
+    force = at_rows(made, made.column(lambda table: np.nan if table.force is None else table.force), part)
     fold = np.full(len(part), number, dtype=np.int64)
     return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)

@@ -1,4 +1,4 @@
-"""One cell: its score, and what is known of it, from recordings and an estimator.
+"""One cell: its score and what belongs to it, from recordings and an estimator.
 
 :func:`load_task` makes the folds, :func:`evaluate_cell` does the rest, for any object with ``fit`` and ``predict`` too.
 """
@@ -30,12 +30,11 @@ from tactbench.core.evaluation.delay import (
 from tactbench.core.evaluation.event_answers import EventRules, state_figures
 from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
 from tactbench.core.evaluation.folds import TaskData, load_task
-from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
+from tactbench.core.evaluation.replicate_sums import replicates, summed
 from tactbench.core.evaluation.sets import tare_s
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -45,7 +44,7 @@ from tactbench.core.evaluation.splits import (
     used_rows,
     without_part,
 )
-from tactbench.core.evaluation.summaries import with_windows
+from tactbench.core.evaluation.summaries import band_limit, clocked, with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers
@@ -59,21 +58,21 @@ from tactbench.core.thread_limit import thread_limit
 
 @dataclass(frozen=True)
 class CellContext:
-    """What one cell asks, but for the recordings."""
+    """The question of one cell, without its recordings."""
 
     task: TaskSpec
     estimator: EstimatorDescriptor
     params: Mapping[str, Any]
-    """other than the estimator's defaults; they are not searched"""
+    """values other than the estimator's defaults; they are not searched"""
     protocol: str
     """how recordings become X and y"""
     split: str | OwnSplit | None
-    """what is kept apart; None: the task's first that fits"""
+    """name of the split; None: the task's first that the recordings can serve"""
     seed: int
-    """decides everything random: the same seed gives the same score in any process"""
+    """seed of everything random: the same seed gives the same score in any process"""
     clock: Clock
     threads: int = 1
-    """that estimator and BLAS may use"""
+    """threads of the estimator and of BLAS"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
     given: Estimator | None = None
@@ -88,7 +87,7 @@ class CellContext:
 
 
 class Result(Evaluated):
-    """What evaluating a cell tells, as its row says it, and the answers."""
+    """The row of an evaluated cell, and its answers."""
 
     split: str
     score: float
@@ -97,7 +96,7 @@ class Result(Evaluated):
 
 
 def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
-    """Load the recordings of a cell (files, or what was read of them) and evaluate its estimator on them.
+    """Load the recordings of a cell (files, or a data set read from them) and evaluate its estimator on them.
 
     Raises
     ------
@@ -140,16 +139,14 @@ def _cost(
     descriptor: EstimatorDescriptor,
     context: CellContext,
 ) -> tuple[Cost, tuple[str, ...]]:
-    """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
-    recorded, task, rules, clock = data.recorded, data.task, data.rules, context.clock
-    looks_back = max(fitted.k, data.window - 1)
-    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, looks_back)
+    """Return the cost of all folds, with the answer delay of the last fold's model, and remarks on the delay."""
+    parts, remarks = stated_delay_ms(data, descriptor, max(fitted.k, data.window - 1))
     p50 = p95 = largest = calls = None
     if context.latency:
-        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
+        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), context.clock)
         p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
         p95, largest = tail_ms(waits_s)
-        ready_s = features_s(recorded, task, rules, descriptor, fitted.fold.test.X, fitted.k, clock)
+        ready_s = features_s(data, descriptor, fitted.fold.test.X, fitted.k, context.clock)
         parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
     cost = Cost(
         search_s=sum(one.search_s for one in answered),
@@ -204,28 +201,25 @@ def _result(
         remarks.append(no_floor)
         truth = None if metric.function else true_force(task, made, tested)
         if floor is not None:
-            own_error, interval = beyond_floor(floor, tested, unit)
             beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
-            beside["score_beyond_floor"] = own_error
+            beside["score_beyond_floor"], interval = beyond_floor(floor, tested, unit)
             beside |= {"beyond_floor_ci_low": interval.low, "beyond_floor_ci_high": interval.high}
         if truth is not None:
             interval = score_interval(metric, truth, tested.y_pred, unit, 0)
-            beside["true_score"] = metric.of(truth, tested.y_pred)
-            beside |= {"true_ci_low": interval.low, "true_ci_high": interval.high}
+            beside |= {"true_score": metric.of(truth, tested.y_pred), "true_ci_low": interval.low}
+            beside["true_ci_high"] = interval.high
     elif rules is None:
         sums = METRICS["accuracy"].rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
-        if task.answer_per != "frame":
-            beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
         scores |= {f"F1 of {label}": float(one) for label, one in zip(classes, class_f1(sums, n_classes), strict=True)}
     if rules is not None:
         detected = [one for fold in answered for one in fold.detected]
-        latency = cost.latency_ms_p50 is not None
-        compute_s = sum(cost.delay_parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3
-        beside["events"] = rules.figures(detected, compute_s if latency else None)
+        parts_ms = cost.delay_parts_ms
+        compute_s = (parts_ms.get("features", 0.0) + parts_ms["prediction"]) / 1e3 if "prediction" in parts_ms else None
+        beside["events"] = rules.figures(detected, compute_s)
         if not beside["events"]["alarms"]:
             remarks.append("never alarms at its operating point")
-        beside["operating_points"] = rules.operating_points(detected, compute_s if latency else None)
+        beside["operating_points"] = rules.operating_points(detected, compute_s)
     elif task.answer_per == "frame":
         scores |= state_figures(tested, made)
     held_s = tare_s(data.recorded) if data.rules.tare else 0.0
@@ -241,7 +235,7 @@ def _result(
         ci_low=interval.low,
         ci_high=interval.high,
         ci_method=interval.method,
-        # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
+        # R² of labels that never change is undefined and left out: NaN is no JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
         n_recordings=len(took_part),
         n_sessions=len({meta.session for meta in took_part}),
@@ -253,7 +247,7 @@ def _result(
         sets=sets,
         replicates=summed(metric, tested, unit, n_classes, floor, truth) if data.unit else {},
         classes=classes,
-        chosen=_chosen(answered) | _thresholds(answered, rules),
+        chosen=_chosen(answered, rules),
         search=[
             {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": one.name}
             for one in answered
@@ -289,11 +283,11 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
-    """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
+    """Return the recordings that some fold uses, counts of those that none uses, and stamps."""
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
-    took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
+    took_part = [recorded.metas[place] for place in np.unique(recorded.recording[used & recorded.labelled]).tolist()]
     if data.split != "shuffled":
         stamps = (*data.stamps, *leak_stamps(recorded, folds))
     else:
@@ -303,7 +297,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
 
 
 def _of_answers(data: TaskData) -> list[str]:
-    """Return what a reader of scores of recordings, frames or events must know."""
+    """Return remarks on how recordings, frames or events were answered."""
     if data.task.answer_per == "recording":
         return [
             f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
@@ -317,28 +311,24 @@ def _of_answers(data: TaskData) -> list[str]:
 
 
 def _incomplete(recorded: Dataset) -> list[str]:
-    """Return how many incomplete recordings were left out or taken, and why they are incomplete."""
-    out = {name: n for name, n in recorded.counts.items() if name.startswith(f"recordings left out ({INCOMPLETE}")}
+    """Return stamps of incomplete recordings that were left out or taken, with the reasons."""
+    start = "recordings left out ("
+    out = {name[len(start) : -1]: n for name, n in recorded.counts.items() if name.startswith(start + INCOMPLETE)}
     taken = [meta.excluded for meta in recorded.metas if meta.excluded]
     every = sum(out.values()) + len(recorded.metas)
-    texts = (
-        [f"{sum(out.values())} of {every} recordings left out: {'; '.join(sorted(name[21:-1] for name in out))}"]
-        if out
-        else []
-    )
-    texts += [f"{len(taken)} of {every} recordings take part although {'; '.join(sorted(set(taken)))}"] if taken else []
-    return texts
+    parts = ((sum(out.values()), "left out:", out), (len(taken), "take part although", set(taken)))
+    return [f"{n} of {every} recordings {what} {'; '.join(sorted(why))}" for n, what, why in parts if n]
 
 
 def _groups_alike(data: TaskData) -> Iterator[str]:
-    """Yield labels that the split keeps apart as two, and that are probably one."""
+    """Yield labels of the split's groups that are probably one although they differ."""
     name = data.assignments[0].groups
     tables = [table.groups[name] for table in data.data.tables if name in table.groups]
     return alike(f"values of {name}", sorted({str(one) for table in tables for one in np.unique(table)}))
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:
-    """Yield which classes were asked for that no training row had: no estimator can answer them."""
+    """Yield the tested classes without a training row, which no estimator can answer."""
     folds: dict[str, list[str]] = {}
     for one in answered:
         for label in one.untrained:
@@ -348,24 +338,21 @@ def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:
         yield f"tested but never trained on: {'; '.join(named)}"
 
 
-def _chosen(answered: Sequence[AnsweredFold]) -> dict[str, float]:
-    """Return what was chosen; fold by fold where folds chose differently, since a median is what nobody chose."""
+def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[str, float]:
+    """Return the numbers chosen; fold by fold where folds differ, since their median is what no fold chose.
+
+    A threshold that is never reached is left out.
+    """
+    each: dict[str, dict[str, float]] = {}
+    for one in answered:
+        values = {**one.choice.params, "k": one.choice.k} if one.choice else {}
+        if rules is not None and rules.own_threshold is None:
+            values["threshold"] = one.detected[0].threshold
+        for name, value in values.items():
+            if isinstance(value, int | float) and np.isfinite(value):
+                each.setdefault(name, {})[one.name] = float(value)
     chosen: dict[str, float] = {}
-    each = {one.name: {**one.choice.params, "k": one.choice.k} for one in answered if one.choice}
-    for name in next(iter(each.values()), {}):
-        values = {fold: params[name] for fold, params in each.items()}
-        if not all(isinstance(value, int | float) for value in values.values()):
-            continue
-        if len(set(values.values())) == 1:
-            chosen[name] = float(next(iter(values.values())))
-        else:
-            chosen |= {f"{name} of fold {fold}": float(value) for fold, value in values.items()}
+    for name, of in each.items():
+        alike = len(of) == len(answered) and len(set(of.values())) == 1
+        chosen |= {name: of[answered[0].name]} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
     return chosen
-
-
-def _thresholds(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[str, float]:
-    """Return the thresholds chosen, by fold where there are several; one that is never reached is not there."""
-    if rules is None or rules.own_threshold is not None:
-        return {}
-    found = {one.name: one.detected[0].threshold for one in answered if np.isfinite(one.detected[0].threshold)}
-    return {"threshold" if len(answered) == 1 else f"threshold of fold {name}": one for name, one in found.items()}

@@ -1,4 +1,4 @@
-"""Finds a task's channels in a recording and puts them on one clock: samples are looked up, never invented."""
+"""Find a task's channels in a recording and put them on one clock: samples are looked up, never interpolated."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WORDS = {
     "taxel": "taxel", "dc_pressure": "static pressure", "ac_pressure": "vibration",
     "dc_temperature": "temperature", "ac_temperature": "heat flow",
 }  # fmt: skip
-"""How a reader calls what a kind of channel measures."""
+"""Readers' words for the kinds of channels."""
 
 
 def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
@@ -47,7 +47,7 @@ def numbers(data: StreamData) -> FloatArray:
 
 
 Found = tuple[str, int, ChannelSpec]
-"""Stream, place in it, and what is there."""
+"""Stream, column in it, and the channel."""
 
 
 def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray:
@@ -67,7 +67,7 @@ def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -
 def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
     """Return the channels that could be meant; of several the one called ``normal``, else the one called ``fz``.
 
-    One called ``shear`` must be asked for by name: it is a force, but not the one that presses.
+    One called ``shear`` must be named by the task: it is a force, but not the one that presses.
     """
     found = [
         (name, place, channel)
@@ -101,7 +101,7 @@ def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recordin
 
 
 def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData) -> str:
-    """Return when `clock` and a channel run that has samples, none of them near; empty where that is not so."""
+    """Return the spans of `clock` and of a channel with samples, none of which is near; empty where that is not so."""
     found = channels_for(recording, target)
     if len(found) != 1:
         return ""
@@ -118,7 +118,7 @@ def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData
 
 
 def unit_factor(channel: ChannelSpec, unit: str) -> float:
-    """Return what turns stored numbers into `unit`: by the channel's unit, or by its scale if that does not tell."""
+    """Return the factor from stored numbers to `unit`: by the channel's unit, else by its scale."""
     try:
         return units.conversion(channel.unit, unit)
     except UsageError:

@@ -1,10 +1,10 @@
-"""Recordings on one clock each, with what the task asks of them."""
+"""Recordings as tables: features, targets and groups of each on one clock."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
+Mask = npt.NDArray[np.bool_]
 MUCH = 0.05
 """Share of the rows left out from which on it stands beside the score."""
 MOST_NAMED = 4
@@ -65,11 +66,11 @@ class Table:
     groups: Mapping[str, npt.NDArray[np.str_]]
     """Labels by which rows can be kept together: name -> (n,)"""
     readings: tuple[StreamReadings, ...] = ()
-    """Every stream on its own clock, times from the first row on; read where a task summarises recordings or frames"""
+    """Every stream on its own clock, times from the first row on; read for tasks of summaries or frames"""
     reference: SlipReference | None = None
-    """What the reference says about slip, on its own clock; read where a task asks for it"""
+    """Slip by the reference, on its own clock; read for tasks of slip"""
     apart: str = ""
-    """From when to when features and target have samples, if these never meet"""
+    """Spans of the samples of features and target, if these never meet"""
 
     def taken(self, rows: slice | IntArray) -> Table:
         """Return some of its rows."""
@@ -79,7 +80,7 @@ class Table:
 
     @property
     def slip(self) -> SlipReference:
-        """The reference, of a task that asks for it."""
+        """The reference of a task of slip."""
         assert self.reference is not None
         return self.reference
 
@@ -93,9 +94,9 @@ class Dataset:
     classes: tuple[Any, ...]
     """Class labels in order of their index; empty for regression"""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """What was left out, and why"""
+    """Counts of what was left out, by reason"""
     findings: tuple[str, ...] = ()
-    """What was found in the recordings that bears on a score, and what of them takes no part"""
+    """Findings in the recordings that bear on a score, and data that take no part"""
     paths: tuple[Path, ...] = ()
     """The files of the tables"""
     whole: bool = False
@@ -104,22 +105,45 @@ class Dataset:
     """That answer is combined from those of the recording's rows"""
 
     @property
+    def labelled(self) -> Mask:
+        """(rows,) whether a row has a label, of all recordings one after the other."""
+        return self.column(lambda table: table.labelled)
+
+    @property
+    def recording(self) -> IntArray:
+        """(rows,) the recording of each row."""
+        return np.repeat(np.arange(len(self.tables)), [len(table.row) for table in self.tables])
+
+    def column(self, of: Callable[[Table], Any], rows: Mask | None = None) -> npt.NDArray[Any]:
+        """Return (n, …) values of all rows, or of some: `of` gives one value for each recording, or for each row."""
+        masks: Sequence[Any] = [...] * len(self.tables) if rows is None else self.parted(rows)
+        found = []
+        for table, mask in zip(self.tables, masks, strict=True):
+            value = of(table)
+            found.append(np.broadcast_to(value, (len(table.row), *np.shape(value)[1:]))[mask])
+        return np.concatenate(found)
+
+    def parted(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Return values of all rows recording by recording."""
+        return np.split(column, np.cumsum([len(table.row) for table in self.tables])[:-1])
+
+    @property
     def metas(self) -> tuple[RecordingMeta, ...]:
-        """What the recordings say about themselves, in order."""
+        """The recordings' metadata, in order."""
         return tuple(table.meta for table in self.tables)
 
 
-def at_rows(tables: Sequence[Table], columns: Sequence[npt.NDArray[Any]], rows: Part | Answers) -> npt.NDArray[Any]:
-    """Return (m, …) what columns of recordings, one of (n, …) each, have at the rows of a set."""
-    found = np.empty((len(rows), *columns[0].shape[1:]), dtype=np.result_type(*columns))
+def at_rows(data: Dataset, column: npt.NDArray[Any], rows: Part | Answers) -> npt.NDArray[Any]:
+    """Return (m, …) values at the rows of a set, of (n, …) values of all rows."""
+    found, columns = np.empty((len(rows), *column.shape[1:]), dtype=column.dtype), data.parted(column)
     for place in np.unique(rows.recording):
         mine = rows.recording == place
-        found[mine] = columns[place][np.searchsorted(tables[place].row, rows.row[mine])]
+        found[mine] = columns[place][np.searchsorted(data.tables[place].row, rows.row[mine])]
     return found
 
 
 def thinned(data: Dataset, every: int) -> Dataset:
-    """Return every such row of each recording, from its first: what a sensor so many times slower would have given."""
+    """Return every `every`-th row of each recording from its first, as a sensor so many times slower gives them."""
     return replace(data, tables=tuple(table.taken(slice(None, None, every)) for table in data.tables))
 
 
@@ -129,7 +153,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     Parameters
     ----------
     include_incomplete
-        Whether those of which more is missing than their rig file allows take part.
+        Whether recordings take part that miss more than their rig file allows.
 
     Raises
     ------
@@ -200,7 +224,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
 
 
 def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:
-    """Return what was found in a recording, other than of streams and channels that `task` does not look at."""
+    """Return the findings in a recording, without those of streams and channels that `task` does not look at."""
     streams = {*feature_streams(recording, task), *(stream.name for stream in recording.meta.reference)}
     channels = {*features, *(channel.name for stream in recording.meta.reference for channel in stream.channels)}
     return [
@@ -212,7 +236,7 @@ def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> l
 
 
 def _in_some(seen: Mapping[str, Mapping[str, str]], n: int) -> Iterator[str]:
-    """Yield by check in how many of `n` recordings something was found, and what; `seen` has it by recording."""
+    """Yield the finding of each check, and in how many of `n` recordings; `seen` has messages by check, recording."""
     for by_name in seen.values():
         (name, message), *_ = by_name.items()
         such = f", such as {name}" if len(set(by_name.values())) > 1 else ""
@@ -220,9 +244,9 @@ def _in_some(seen: Mapping[str, Mapping[str, str]], n: int) -> Iterator[str]:
 
 
 def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[str]:
-    """Yield which recordings have no row that can be used, and the share of the rows of the others that cannot.
+    """Yield the recordings without a usable row, and the share of unusable rows of the others.
 
-    A label that is not there is no row lost: who gave the labels has left it out.
+    A missing label is no lost row: it was left out on purpose.
     """
     out = [table for table in tables if not table.labelled.any()]
     if out:
@@ -337,7 +361,7 @@ def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> No
 
 
 def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]) -> None:
-    """Count the samples and rows that are kept although something is said against them."""
+    """Count the samples and rows that are kept although they are flagged."""
     if stream.quality is None:
         return
     quality = stream.quality[:, picked]
@@ -371,7 +395,7 @@ def _own_readings(
 
 
 Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
-"""Targets, and which of them are there."""
+"""Targets, and a mask of those that are there."""
 
 
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
@@ -387,14 +411,14 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
 
 
 def _channels_of(task: TaskSpec) -> tuple[ChannelTarget, ...]:
-    """Return the channels that a task asks for; none where it asks for labels or events."""
+    """Return the target channels of a task; none where its target is a label or slip."""
     if isinstance(task.target, VectorTarget):
         return task.target.components
     return (task.target,) if isinstance(task.target, ChannelTarget) else ()
 
 
 def _as_numbers(found: Labels, name: str, recording: str) -> Labels:
-    """Return labels as the numbers they say: a mapping's words are texts."""
+    """Return labels, which a mapping gives as texts, as numbers."""
     values, there = found
     numbers = np.full(len(values), np.nan)
     try:
@@ -418,7 +442,7 @@ def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
 
 
 def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, npt.NDArray[np.str_]]:
-    """Return labels by which rows can be kept together; the answer asked for is none of them."""
+    """Return labels by which rows can be kept together; the target is none of them."""
     n = len(data.data)
     constant = {
         "session": meta.session,
@@ -429,7 +453,7 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     if meta.trial:
         constant["trial"] = meta.trial
     groups = {name: np.full(n, value) for name, value in constant.items()}
-    # A number of a press counts within its session only.
+    # Numbers of presses count within their session.
     for name, column in data.annotations.items():
         own = column.dtype.kind in "iu"
         groups[name] = np.array([f"{meta.session}/{value}" if own else str(value) for value in column], dtype=np.str_)

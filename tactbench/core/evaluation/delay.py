@@ -1,4 +1,4 @@
-"""How late an answer is, from a change at the skin to the answer that knows of it, part by part; what calls take."""
+"""The delay from a change at the skin to the answer that reflects it, part by part, and the duration of calls."""
 
 from __future__ import annotations
 
@@ -9,10 +9,17 @@ from typing import TypeVar
 import numpy as np
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.frames import frame_features, frame_times, slip_target
+from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
-from tactbench.core.evaluation.summaries import is_summarised, kept, recording_features
+from tactbench.core.evaluation.summaries import (
+    frame_features,
+    frame_times,
+    is_summarised,
+    kept,
+    recording_features,
+    slip_target,
+)
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
@@ -25,29 +32,25 @@ Clock = Callable[[], float]
 """Seconds, monotonic."""
 
 RATE_TOLERANCE = 0.01
-"""Relative difference of rates beyond which a remark says so: rates are stated to two or three digits."""
+"""Relative difference of rates that is remarked: rates are stated to two or three digits."""
 
 SLOWEST_S = 1.0
-"""Rows further apart are single readings, such as one a press, and tell no sampling interval (assumed)."""
+"""Interval beyond which rows are single readings, such as one a press, which have no sampling interval (assumed)."""
 NO_LINK = "link delay unknown: an answer delay is without it"
-NO_RATE = "answer delay unknown: the recordings do not tell their sampling rate"
+NO_RATE = "answer delay unknown: the recordings state no sampling rate"
 AT_LEAST, AT_MOST = 20, 200
 BUDGET_S = 0.3
 CALLS_OF_P95 = 200
 """Fewer calls have too few beyond their 95th percentile (ten of 200) to state it; the largest is stated instead."""
 RECORDINGS_TIMED = 3
-"""Of frames: each is hundreds of them."""
+"""Recordings whose frames are timed: each has hundreds of them."""
 
 
-def stated_delay_ms(
-    recorded: Dataset, made: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor, k: int
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parts of the answer delay that no machine decides, in ms, and remarks on them.
+def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the parts of the answer delay that do not depend on the machine, in ms, and remarks on them.
 
     Parameters
     ----------
-    recorded, made
-        The recordings as they were read, and with the features that the answers used.
     k
         Rows that the mean filter, or a window, looks back.
 
@@ -56,8 +59,7 @@ def stated_delay_ms(
     dict, tuple
         ``sampling``: one interval of the slowest stream used, at the sensor's own rate: a change just after a sample
         waits that long for the next one. Where the sensor states no rate, or its clock a slower one, the interval of
-        the recordings. Of frames the
-        wait for the next frame, where that is longer.
+        the recordings. Of frames the wait for the next frame, where that is longer.
         ``link``: as the sensor's spec states it.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
         samples has linear phase of slope (n - 1) / 2; Oppenheim and Schafer, Discrete-Time Signal Processing, section
@@ -66,6 +68,7 @@ def stated_delay_ms(
         are answered whole, the time that one is listened to.
         A part that is not known is absent; answers that look at no reading have none.
     """
+    task, rules, recorded = data.task, data.rules, data.recorded
     frames = task.answer_per == "frame"
     if estimator.looks_at != "features" and not (frames and estimator.looks_at == "reference"):
         return {}, ()
@@ -76,7 +79,7 @@ def stated_delay_ms(
             stream.rate_hz
             for table in recorded.tables
             for stream in table.readings
-            if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in made.features)
+            if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in data.feature_names)
         ]
         parts["sampling"] = 1e3 * max([target.hop_s, *(1.0 / rate for rate in rates if rate)])
         parts["window"] = 1e3 * target.window_s / 2 if estimator.looks_at == "features" else 0.0
@@ -99,7 +102,7 @@ def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[
             sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stated_hz
             own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz)
             own_hz = own_hz / rules.every if own_hz else sampled_hz
-            # A rig may record a sensor at a rate below its own; where none says so, a clock outweighs what is stated.
+            # A rig may record a sensor below its own rate; unless the rig states that, the clock outweighs the spec.
             slower = sampled_hz and own_hz and sampled_hz < (1 - RATE_TOLERANCE) * own_hz
             waited_hz = sampled_hz if slower and stream.name not in meta.own_rates_hz else own_hz
             waits_ms.append(1e3 / waited_hz if waited_hz else None)
@@ -179,38 +182,35 @@ def _length_s(stream: StreamReadings) -> float | None:
     return None if stream.rate_hz is None else len(stream.data) / stream.rate_hz
 
 
-def features_s(
-    recorded: Dataset,
-    task: TaskSpec,
-    rules: ProtocolSpec,
-    estimator: EstimatorDescriptor,
-    X: FloatArray,
-    k: int,
-    clock: Clock,
-) -> float | None:
+def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k: int, clock: Clock) -> float | None:
     """Return the median seconds that the features of one answer take, or None for an answer that looks at no reading.
 
-    Of a frame: those of a recording over its frames. A detector at work makes them frame by frame, in more calls.
+    Of a frame: those of a recording over its frames. A detector at work makes them frame by frame, in more calls. Of a
+    single row of `X`: taring, scaling and the mean over `k` + 1 readings, with the code that prepares whole sets.
     """
-    if task.answer_per == "frame":
-        if estimator.looks_at not in ("features", "reference"):
-            return None
+    task, rules, tables = data.task, data.rules, data.recorded.tables
+    if task.answer_per == "frame" and estimator.looks_at in ("features", "reference"):
         compute = frame_features(task, rules, estimator)
         spent_s = []
-        for place in np.linspace(0, len(recorded.tables) - 1, RECORDINGS_TIMED).astype(int).tolist():
-            frames = frame_times(recorded.tables[place], task, rules)
+        for place in np.linspace(0, len(tables) - 1, RECORDINGS_TIMED).astype(int).tolist():
+            frames = frame_times(tables[place], task, rules)
             began = clock()
-            compute(recorded.tables[place], frames)
+            compute(tables[place], frames)
             spent_s.append((clock() - began) / len(frames))
         return float(np.median(spent_s))
     if estimator.looks_at != "features":
         return None
-    if is_summarised(task, rules):  # a median needs no more calls, and a row keeps nothing else of them
-        tables = recorded.tables
-        ready_s = calls_s(len(tables), tables.__getitem__, recording_features(task, rules), clock, AT_LEAST)
-    else:
-        ready_s = single_row_preparation_s(X, k, clock, tared=rules.tare, at_most=AT_LEAST)
-    return float(np.median(ready_s))
+    if is_summarised(task, rules):
+        work = recording_features(task, rules)
+        return float(np.median(calls_s(len(tables), tables.__getitem__, work, clock, AT_LEAST)))
+    rest, scale = np.zeros(X.shape[-1]), FeatureScale(np.zeros(X.shape[-1]), np.ones(X.shape[-1]))
+    segment = np.zeros(k + 1, dtype=np.int64)
+
+    def ready(readings: FloatArray) -> FloatArray:
+        return causal_mean(scale(readings - rest if rules.tare else readings), k, segment[: len(readings)])[-1:]
+
+    # Rows stand for raw readings: values change no time. A median needs no more calls than the fewest.
+    return float(np.median(calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, AT_LEAST)))
 
 
 def single_row_latency_s(model: Estimator, X: FloatArray, clock: Clock) -> FloatArray:
@@ -220,24 +220,6 @@ def single_row_latency_s(model: Estimator, X: FloatArray, clock: Clock) -> Float
     over `X`, so that a model that answers some rows faster is not flattered.
     """
     return calls_s(len(X), lambda place: X[place : place + 1], model.predict, clock)
-
-
-def single_row_preparation_s(
-    X: FloatArray, k: int, clock: Clock, *, tared: bool = False, at_most: int = AT_MOST
-) -> FloatArray:
-    """Return (calls,) seconds of making one row of features ready from the `k` + 1 readings that it is made of.
-
-    At most `at_most` calls, else as :func:`single_row_latency_s`, with the code that prepares whole
-    sets: taring if `tared`, scaling, the mean over the window. Rows of `X` stand for raw readings:
-    values change no time.
-    """
-    rest, scale = np.zeros(X.shape[-1]), FeatureScale(np.zeros(X.shape[-1]), np.ones(X.shape[-1]))
-    segment = np.zeros(k + 1, dtype=np.int64)
-
-    def ready(readings: FloatArray) -> FloatArray:
-        return causal_mean(scale(readings - rest if tared else readings), k, segment[: len(readings)])[-1:]
-
-    return calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, at_most)
 
 
 def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
@@ -253,7 +235,7 @@ def calls_s(
     clock: Clock,
     at_most: int = AT_MOST,
 ) -> FloatArray:
-    """Return (calls,) seconds of `work` on what is `given` for places spread over `rows`."""
+    """Return (calls,) seconds of `work` on the values that `given` has for places spread over `rows`."""
     places = np.linspace(0, rows - 1, at_most).astype(int)
     work(given(places[0]))  # the first call of a library takes longer
     spent: list[float] = []
@@ -268,7 +250,7 @@ def calls_s(
 
 
 def peak_rss_mb() -> float | None:
-    """Return the largest resident memory of this process so far, MB; None where the system does not tell."""
+    """Return the largest resident memory of this process so far, MB; None where the system does not report it."""
     try:
         import resource
     except ImportError:

@@ -1,4 +1,4 @@
-"""From a detector's score a frame to alarms, to what they hit, and to the figures of a row."""
+"""Alarms from a detector's score of each frame, the events that they hit, and the figures of a row."""
 
 from __future__ import annotations
 
@@ -10,21 +10,27 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.frames import slip_target
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.slip_reference import SlipReference
-from tactbench.core.events.alarms import alarms
+from tactbench.core.evaluation.summaries import slip_target
+from tactbench.core.events.alarms import (
+    EventScores,
+    GroundTruth,
+    alarms,
+    displacement_at_detection,
+    latency_s,
+    score_events,
+)
 from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, threshold_curve
 from tactbench.core.events.labels import GROSS, UNDECIDED
-from tactbench.core.events.metrics import EventScores, GroundTruth, displacement_at_detection, latency_s, score_events
 from tactbench.core.samples import Answers, FloatArray, IntArray, Part
 from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec
 
 OTHER_SCALES = {0.5: "halved", 2.0: "doubled"}
-"""Of the label thresholds."""
+"""Other scales of the label thresholds, and their words."""
 BOUNDS_PER_MINUTE = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""False alarms a minute on validation recordings, at each of which a threshold is chosen to show what latency costs."""
+"""False alarms a minute on validation recordings; a threshold is chosen for each bound to show the cost of latency."""
 
 
 class Scored(NamedTuple):
@@ -39,7 +45,7 @@ class Scored(NamedTuple):
     reference: SlipReference
 
     def truth(self, scale: float = 1.0) -> GroundTruth:
-        """Return what happened, under thresholds of labels times `scale`; no event before the first frame counts."""
+        """Return the events, under label thresholds times `scale`; none before the first frame counts."""
         span = int(self.t_ns[0]), int(self.t_ns[-1]) + 1
         events = self.reference.labels[scale].gross_ns
         events = events[(events[:, 0] >= span[0]) & (events[:, 0] < span[1])]
@@ -47,7 +53,7 @@ class Scored(NamedTuple):
 
 
 class Detected(NamedTuple):
-    """A test recording, and what raises its alarms."""
+    """A test recording, and the thresholds of its alarms."""
 
     scored: Scored
     threshold: float
@@ -57,7 +63,7 @@ class Detected(NamedTuple):
 
 @dataclass(frozen=True)
 class EventRules:
-    """How a detector's scores become alarms, and what is counted of these."""
+    """The rules by which a detector's scores become alarms, and alarms become figures."""
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
@@ -116,7 +122,7 @@ class EventRules:
         )
 
     def items(self, several: Sequence[Scored], curve: ThresholdCurve, data: Dataset, fold: int) -> Answers:
-        """Return what the area is a mean over: each event, with the share of the rates at which it is hit.
+        """Return the summands of the area: each event, with the share of the rates at which it is hit.
 
         A line of each recording, which is no event, stands before its events, so that each recording has a part in the
         interval. The row is the last frame before the onset, the time that of the onset.
@@ -133,21 +139,20 @@ class EventRules:
                     hint="Give every fold test recordings of disturbances (label `event: disturbance`).",
                 ) from error
         shares = np.split(found, np.cumsum([len(one) for one in onsets])[:-1])
-        lines: list[tuple[int, float, int, int, int]] = []
+        columns = []
         for one, onset, share in zip(several, onsets, shares, strict=True):
-            t_ns = np.rint(data.tables[one.place].time_s * 1e9).astype(np.int64)
-            for event, hit, at in [
-                (0, 0.0, int(one.t_ns[0])),
-                *((1, *pair) for pair in zip(share, onset, strict=True)),
-            ]:
-                last = max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)
-                lines.append((event, hit, one.place, int(data.tables[one.place].row[last]), at))
-        true, hits, place, row, at_ns = map(np.array, zip(*lines, strict=True))
-        none, number = np.full(len(lines), np.nan), np.full(len(lines), fold, dtype=np.int64)
-        return Answers(true, hits, place, row, number, at_ns * 1e-9, none)
+            table, at_ns = data.tables[one.place], np.append(one.t_ns[:1], onset)
+            last = np.searchsorted(np.rint(table.time_s * 1e9), at_ns, side="right") - 1
+            rows = table.row[np.maximum(last, 0)]
+            columns.append(
+                (np.sign(np.arange(len(at_ns))), np.append(0.0, share), np.full(len(at_ns), one.place), rows, at_ns)
+            )
+        true, hits, place, row, at_ns = map(np.concatenate, zip(*columns, strict=True))
+        none, number = np.full(len(true), np.nan), np.full(len(true), fold, dtype=np.int64)
+        return Answers(true, hits, place, row, number, np.asarray(at_ns * 1e-9, dtype=np.float64), none)
 
     def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
-        """Return what is said of the events of all test recordings; what cannot be said is not there.
+        """Return figures of the events of all test recordings, without those that are undefined.
 
         Parameters
         ----------
@@ -184,7 +189,7 @@ class EventRules:
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
     def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> list[dict[str, float]]:
-        """Return what test recordings say at thresholds that validation chose for several bounds of false alarms."""
+        """Return figures of test recordings at thresholds chosen on validation for several bounds of false alarms."""
         found = []
         for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else ()):
             scores = self._scores([one._replace(threshold=one.bounds[number]) for one in tested])

@@ -1,4 +1,4 @@
-"""An estimator: made, fitted, asked, and its hyper-parameters chosen on data it is neither trained nor tested on."""
+"""Estimators are made, fitted and used; their hyper-parameters are chosen on data of neither training nor test."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ Build = Callable[[Mapping[str, Any]], Estimator]
 def builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
-    """Return what makes a fresh estimator from parameters, one a component where the task asks for a vector.
+    """Return a function that makes a fresh estimator from parameters, one for each component of a vector.
 
-    Its imports are done, and one has been made to see. Raises UsageError if the estimator cannot answer this kind of
+    Its imports are done, and one has been made on trial. Raises UsageError if the estimator cannot answer this kind of
     question, or a parameter is not one of its own.
     """
     if task.kind not in estimator.kinds:
@@ -61,12 +61,12 @@ def builder(
 
 
 def one_model_a_component(task: TaskSpec, build: Build) -> Build:
-    """Return `build`; where the task asks for a vector, what makes an estimator a component."""
+    """Return `build`; where the task asks for a vector, a function that makes an estimator for each component."""
     return (lambda chosen: PerComponent(lambda: build(chosen))) if isinstance(task.target, VectorTarget) else build
 
 
 class PerComponent:
-    """A model for each component of a vector, each made by `build` and taught as if it were asked for alone."""
+    """A model for each component of a vector, each made by `build` and fitted by itself."""
 
     def __init__(self, build: Callable[[], Estimator]) -> None:
         self._build = build
@@ -85,10 +85,10 @@ class PerComponent:
 
 
 def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str], **params: Any) -> None:
-    """Fit `model` to X (n, p) and y (n,) or (n, components), with what else its ``fit`` takes.
+    """Fit `model` to X (n, p) and y (n,) or (n, components), with other parameters of its ``fit``.
 
-    A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
-    standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
+    A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row. Raises
+    DataError if the estimator refuses the data.
     """
     refused = (ValueError, ArithmeticError, *((TypeError,) if params else ()))
     with warnings.catch_warnings(record=True) as caught:
@@ -108,7 +108,7 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
 
 
 def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Callable[[Part], Any]]:
-    """Return what makes of a training set what ``fit`` of an object is given beside it, by scikit-learn's names.
+    """Return functions from a training set to further parameters of an object's ``fit``, by scikit-learn's names.
 
     `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
     the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
@@ -119,7 +119,7 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
             value = data.per_row(f"params[{name!r}]", value)
         if isinstance(value, str) or np.shape(value)[:1] != data.y.shape[:1]:
             return lambda _: value
-        return partial(at_rows, data.data.tables, data.spread(np.asarray(value)))
+        return partial(at_rows, data.data, data.spread(np.asarray(value)))
 
     if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
         routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)
@@ -160,13 +160,13 @@ def answers(
     return given.astype(np.int64 if n_classes else np.float64)
 
 
-def asked(model: Estimator, part: Part, descriptor: EstimatorDescriptor, n_classes: int) -> npt.NDArray[Any]:
+def answers_to(part: Part, model: Estimator, descriptor: EstimatorDescriptor, n_classes: int) -> npt.NDArray[Any]:
     """Return the answers of `model` to the rows of a set, as :func:`answers` does."""
     return answers(model, features_of(part, descriptor), descriptor.name, n_classes, part.y.shape[1:])
 
 
 def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
-    """Return the last row of each recording, and what the (n,) answers to its rows come to.
+    """Return the last row of each recording, and its answer, combined from the (n,) answers to its rows.
 
     That is the commonest class, of equals the first; where `n_classes` is 0, the mean. Rows are in order of recording
     and time.
@@ -192,7 +192,7 @@ class Choice:
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
-    """Return what the estimator may look at."""
+    """Return the features that the estimator may look at."""
     if descriptor.looks_at == "time":
         return one.row.astype(np.float64)[:, None]
     if descriptor.looks_at == "nothing":
@@ -212,8 +212,8 @@ def select(
 ) -> Choice | None:
     """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
 
-    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts` is
-    told which fits came with a warning.
+    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts`
+    gets the fits with a warning.
     """
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:
@@ -250,7 +250,7 @@ def select(
             for learned, check in filtered:
                 model = build(params)
                 fit(model, features_of(learned, descriptor), learned.y, descriptor.name, counts)
-                predicted = asked(model, check, descriptor, n_classes)
+                predicted = answers_to(check, model, descriptor, n_classes)
                 checked, combined = voted(check, predicted, n_classes) if data.vote else (check, predicted)
                 truth.append(checked.y)
                 answered.append(combined)

@@ -11,32 +11,30 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, wrong
-from tactbench.core.evaluation.dataset import Dataset, load_dataset, thinned
-from tactbench.core.evaluation.frames import framed
+from tactbench.core.evaluation.dataset import Dataset, Mask, load_dataset, thinned
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
 from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
 from tactbench.core.evaluation.splits import (
     SPLITS_WITHOUT_GROUPS,
     Assignment,
-    Mask,
     OwnSplit,
     choose_split,
     make_splits,
     with_validation,
 )
-from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
+from tactbench.core.evaluation.summaries import framed, is_summarised, summarised, with_windows
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
-"""What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
+"""The descriptor of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
 
 
 @dataclass(frozen=True, repr=False)
 class TaskData:
-    """What a task asks of recordings under a protocol: rows, and which of them train and test.
+    """The rows of a task under a protocol, and which of them train and test.
 
     `X` is tared, and neither scaled nor filtered: these are fitted on each fold's training rows.
     """
@@ -49,13 +47,13 @@ class TaskData:
     data: Dataset
     """the same as rows to be answered: samples, windows of them, frames, or one row a recording"""
     assignments: tuple[Assignment, ...]
-    """which rows of each recording are for what, fold by fold"""
+    """the rows that train, test and validate, fold by fold"""
     held_back: bool = False
-    """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+    """thresholds are chosen on a share of the training groups: no recording has the role validation"""
     unit: str | None = "session"
     """name of the groups that are held out, which intervals are over; None: the caller's own split names none"""
     stamps: tuple[str, ...] = ()
-    """what the caller's own split gives away"""
+    """leaks of the caller's own split"""
     window: int = 0
     """rows of a window; 0: rows are answered one by one"""
 
@@ -65,23 +63,22 @@ class TaskData:
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features), of windows (n, window, features), of the rows that are asked for and have a label."""
-        return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
+        """Return (n, features), or (n, window, features), of the labelled rows that the protocol keeps."""
+        return self.data.column(lambda table: tared(table) if self.rules.tare else table.X, self._there)
 
     @property
     def y(self) -> npt.NDArray[Any]:
         """Return (n,) numbers or class indices, (n, components) of a vector."""
-        return self._joined([table.y for table in self.data.tables])
+        return self.data.column(lambda table: table.y, self._there)
 
     @property
     def groups(self) -> npt.NDArray[Any]:
         """Return (n,) labels that the split keeps apart; those of the session where it keeps no group apart."""
-        tables, name = self.data.tables, self.assignments[0].groups
-        return self._joined([table.groups[name] for table in tables])
+        return self.per_row("groups", self.assignments[0].groups)
 
     @property
     def feature_names(self) -> tuple[str, ...]:
-        """Return what the columns of `X` are called."""
+        """Return the names of the columns of `X`."""
         return self.data.features
 
     @property
@@ -92,10 +89,8 @@ class TaskData:
     @property
     def folds(self) -> list[tuple[IntArray, IntArray]]:
         """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
-        return [
-            (np.flatnonzero(self._joined(one.train)), np.flatnonzero(self._joined(one.test)))
-            for one in self.assignments
-        ]
+        there = self._there
+        return [(np.flatnonzero(one.train[there]), np.flatnonzero(one.test[there])) for one in self.assignments]
 
     def per_row(self, argument: str, given: Any) -> npt.NDArray[Any]:
         """Return (n,) values, one for each row of `X`: an array that was given, or the labels of a name."""
@@ -103,26 +98,22 @@ class TaskData:
             known = set.intersection(*(set(table.groups) for table in self.data.tables))
             if given not in known:
                 raise wrong(argument, given, f"a label of the recordings ({', '.join(sorted(known))}), or an array")
-            return self._joined([table.groups[given] for table in self.data.tables])
+            return self.data.column(lambda table: table.groups[given], self._there)
         column, n = np.asarray(given), len(self.y)
         if column.shape != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
             raise wrong(argument, given, f"the name of a label, or an array of {n} values, one for each row of X")
         return column
 
-    def spread(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
-        """Return (n,) values of the rows of `X` recording by recording; rows that are not in it have an empty one."""
-        found, before = [], 0
-        for mask in self._there():
-            found.append(np.zeros((len(mask), *column.shape[1:]), dtype=column.dtype))
-            found[-1][mask] = column[before : before + mask.sum()]
-            before += int(mask.sum())
+    def spread(self, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return values of the rows of `X` at their places among all rows, which else have an empty one."""
+        there = self._there
+        found = np.zeros((len(there), *column.shape[1:]), dtype=column.dtype)
+        found[there] = column
         return found
 
-    def _there(self) -> list[Mask]:
-        return [asked_for(table, self.rules) & table.labelled for table in self.data.tables]
-
-    def _joined(self, columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        return np.concatenate([column[mask] for column, mask in zip(columns, self._there(), strict=True)])
+    @property
+    def _there(self) -> Mask:
+        return self.data.column(lambda table: asked_for(table, self.rules) & table.labelled)
 
 
 def load_task(
@@ -141,9 +132,9 @@ def load_task(
     Parameters
     ----------
     recordings
-        Files, or what was read of them already.
+        Files, or a data set read from them.
     split
-        What is kept apart; None: the task's first that the recordings can serve.
+        Name of the split; None: the task's first that the recordings can serve.
     estimator
         Decides the features of frames, the gap between training and test where recordings are cut in time (its longest
         window), and whether a threshold has to be chosen.
@@ -155,7 +146,7 @@ def load_task(
     Raises
     ------
     NotApplicable
-        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's. If the
+        If the estimator looks at the time and a recording states none: the order of its rows means nothing. If the
         protocol thins samples or states a window, and the task is not answered sample by sample.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
@@ -184,8 +175,8 @@ def load_task(
         folds = make_splits(data, name, seed, max(estimator.window_grid), one_by_one=name in task.campaigns)
         made = replace(made, assignments=tuple(folds))
     if window:
-        made = replace(made, assignments=tuple(apart(one, window, step) for one in made.assignments))
-    if not any(mask.any() for one in made.assignments for mask in one.train):
+        made = replace(made, assignments=tuple(apart(one, data, window, step) for one in made.assignments))
+    if not any(one.train.any() for one in made.assignments):
         which = f", window={window}" if window else ""
         raise DataError(f"No fold could be made of these recordings{which}.", hint="Choose another split or window.")
     if task.kind == "events" and estimator.threshold is None and made.assignments[0].validation is None:
@@ -206,13 +197,13 @@ def _with_own_folds(made: TaskData, own: OwnSplit) -> TaskData:
     if own.groups is not None:
         name = own.groups if isinstance(own.groups, str) else "group"
         apart_by = groups = made.per_row("groups", own.groups)
-        each = zip(made.data.tables, made.spread(groups.astype(np.str_)), strict=True)
+        each = zip(made.data.tables, made.data.parted(made.spread(groups.astype(np.str_))), strict=True)
         tables = tuple(replace(table, groups={**table.groups, name: mine}) for table, mine in each)
         made = replace(made, data=replace(made.data, tables=tables))
     folds: list[Assignment] = []
     stamps: list[str] = []
     for number, pair in enumerate(own.folds(made.X, made.y, groups), 1):
-        train, test = (tuple(made.spread(np.isin(np.arange(len(apart_by)), places))) for places in pair)
+        train, test = (made.spread(np.isin(np.arange(len(apart_by)), places)) for places in pair)
         folds.append(Assignment(str(number), train, test, groups="session" if groups is None else name))
         both = np.intersect1d(apart_by[pair[0]], apart_by[pair[1]])
         stamps += [f"{LEAKS}split {own.name} puts {name} {one} on both sides of fold {number}." for one in both[:1]]

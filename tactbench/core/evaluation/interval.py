@@ -16,7 +16,7 @@ from tactbench.core.spec.row import plural
 
 LEVEL = 0.95
 ENOUGH_UNITS = 5
-"""Fewer than this cannot tell how units differ."""
+"""Units that an interval needs: fewer do not show how units differ."""
 FURTHEST = 10.0
 """Multiple of an error from which on the upper end of its interval is open: so few units may put no bound to it."""
 _MOST_FREEDOM = 1e9
@@ -36,14 +36,14 @@ class Interval:
 
 @dataclass(frozen=True)
 class ReplicateUnits:
-    """What a split holds out: sessions, objects or recordings."""
+    """The units that a split holds out: sessions, objects or recordings."""
 
     name: str
-    """What one of them is called: session, object …"""
+    """Word for one of them: session, object …"""
     codes: IntArray
     """(n,) which one each row belongs to"""
     labels: tuple[str, ...]
-    """What each is called, by its code"""
+    """Labels by code"""
 
     def sums(self, rows: FloatArray) -> FloatArray:
         """Return (units, m) sums of (n, m) summands over the rows of each."""
@@ -52,7 +52,7 @@ class ReplicateUnits:
         return out
 
     def enough(self, y: npt.NDArray[Any], n_classes: int) -> bool:
-        """Tell whether there are enough of them for an interval, of every class that occurs in (n,) labels."""
+        """Return whether there are enough units for an interval, of every class that occurs in (n,) labels."""
         each = [y == one for one in range(n_classes)]
         own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
         return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
@@ -73,23 +73,15 @@ class ReplicateUnits:
 def score_interval(
     metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
 ) -> Interval:
-    """Return the interval of ``metric.of(y, predicted)``; no ends where fewer than five units, or of a class, tell it.
+    """Return the interval of ``metric.of(y, predicted)``; no ends for fewer than five units, or of a class.
 
     Notes
     -----
     Each unit is left out in turn, those of one class standing in for each other only, and the interval is Student's
-    over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of resampled units cover less
-    than they say where there are few. Errors have half the degrees of freedom: offsets of units make their squares so
-    long-tailed that a spread of n of them is worth no more, as of numbers with an excess kurtosis of 2 (Box 1953,
-    Non-normality and tests on variances); with all of them 83 to 89 % were covered. Rows, or units within those that
-    are held out, are no replicates: an interval over them knows nothing of the spread between units.
-    ``benchmarks/coverage.py`` measures all of this.
-
-    A share so near to 1 that its mistakes are at most two, or lie in fewer than a third of the units and would not fill
-    one, does not tell how units differ. Its lower end is multiplied by that of n units right out of n, ``0.025^(1/n)``
-    [2]_: a kind of unit that occurs more often would have been met. Its upper end lets units with a mistake be as rare
-    as the binomial lower end of their number allows. An answer without any mistake is the limit of this rule; shares
-    near 0 mirror it.
+    over units [1]_, on a scale that suits the metric (:func:`transform_of`). Errors have half the degrees of freedom,
+    since squares of offsets of units are long-tailed (Box 1953, Non-normality and tests on variances). Shares near 1
+    with few mistakes have ends from the binomial distribution [2]_, and those near 0 mirror them. docs/statistics.md,
+    section 2, gives the reasons; ``benchmarks/coverage.py`` measures the coverage.
 
     References
     ----------
@@ -129,7 +121,7 @@ def score_interval(
 
 
 def _few(each: FloatArray) -> bool:
-    """Tell whether (units,) counts do not tell how units differ: two in all, or in less than a third of the units."""
+    """Return whether (units,) counts are too few to show how units differ: two in all, or in under a third of them."""
     return bool(each.sum() <= 2 or np.count_nonzero(each) < len(each) / 3)
 
 
@@ -213,10 +205,9 @@ def transform_of(metric: Metric, score: float, n: int) -> ScoreTransform:
 
     Notes
     -----
-    A mean of squares from few sessions that is too low also looks too certain, and the reverse, so that Student's
-    interval of it misses a large truth too often; that of its reciprocal does not. Shares near 0 or 1 have no room on
-    one side: their logarithmic odds have (Agresti 2013, Categorical data analysis, section 3.1). Both are measured in
-    ``benchmarks/coverage.py``.
+    A mean of squares from few sessions that is too low also has too narrow an interval, and the reverse; that of its
+    reciprocal does not. Shares near 0 or 1 have room on both sides on the scale of log-odds (Agresti 2013, Categorical
+    data analysis, section 3.1). Both are measured in ``benchmarks/coverage.py``.
     """
     if metric.function is not None:
         return ScoreTransform("its own scale", np.asarray, np.asarray)

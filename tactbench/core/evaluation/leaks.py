@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.evaluation.dataset import Dataset, Mask
+from tactbench.core.evaluation.splits import Assignment
 from tactbench.core.recording.health import MONOTONE, is_copy
 from tactbench.core.spec.row import LEAKS
 
@@ -28,10 +29,10 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
     """Return a stamp if a channel gives the target of a regression away, or its size, else nothing."""
     if data.classes:
         return ()
-    X, y = (np.concatenate([getattr(one, name)[one.labelled] for one in data.tables]) for name in ("X", "y"))
-    recording = np.repeat(np.arange(len(data.tables)), [one.labelled.sum() for one in data.tables])
+    X, y = (data.column(attrgetter(name), data.labelled) for name in ("X", "y"))
+    recording = data.recording[data.labelled]
     parts = [*y.reshape(len(y), -1).T]
-    parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square does not tell the sign
+    parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square loses the sign
     channels = zip(data.features, X.T, strict=True)
     found = [name for name, column in channels if any(is_copy(column, part, recording) for part in parts)]
     return (f"{LEAKS}{', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
@@ -42,15 +43,15 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
     rows = [_mixed(table.X, table.force).sum(axis=1, dtype=np.uint64) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
-        known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, _learned(fold), strict=True)]
-        tested = [_blocks(hashes[mask]) for hashes, mask in zip(rows, fold.test, strict=True)]
+        known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, data.parted(_learned(fold)), strict=True)]
+        tested = [_blocks(hashes[mask]) for hashes, mask in zip(rows, data.parted(fold.test), strict=True)]
         ends = np.cumsum([len(blocks) for blocks, _, _ in tested])
         met = np.isin(np.concatenate([blocks for blocks, _, _ in tested]), np.concatenate(known))
         covered = [
             np.unique(starts[mine][:, None] + np.arange(length)).size
             for (_, starts, length), mine in zip(tested, np.split(met, ends[:-1]), strict=True)
         ]
-        share = sum(covered) / max(sum(int(mask.sum()) for mask in fold.test), 1)
+        share = sum(covered) / max(int(fold.test.sum()), 1)
         if share > worst:
             test = int(np.argmax(covered))
             train = int(np.argmax([np.isin(tested[test][0], blocks).sum() for blocks in known]))
@@ -63,31 +64,25 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
     )
 
 
-def _learned(fold: Assignment) -> tuple[Mask, ...]:
+def _learned(fold: Assignment) -> Mask:
     """Return the rows that a fold trains or validates on."""
-    if fold.validation is None:
-        return fold.train
-    return tuple(one | other for one, other in zip(fold.train, fold.validation, strict=True))
+    return fold.train if fold.validation is None else fold.train | fold.validation
 
 
 def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
-    """Return a stamp if rows that stand each for itself, since no clock orders them, stand on both sides of a split."""
+    """Return a stamp if rows without a clock, each a reading by itself, stand on both sides of a split."""
     if not all(one.meta.clock == "none" or len(one.row) == 1 for one in data.tables):
         return ()
-    mixed = [_mixed(one.X, one.force, *([] if data.classes else [one.y])) for one in data.tables]
-    rows, *halves = (
-        [one[:, start::step].sum(axis=1, dtype=np.uint64) for one in mixed] for start, step in ((0, 1), (0, 2), (1, 2))
-    )
+    mixed = data.column(lambda table: _mixed(table.X, table.force, *([] if data.classes else [table.y])))
+    rows, *halves = (mixed[:, start::step].sum(axis=1, dtype=np.uint64) for start, step in ((0, 1), (0, 2), (1, 2)))
 
     def shared(fold: Assignment) -> float:
         """Return the share of the distinct test rows that training has too."""
-        sets = [[one[mask] for one, mask in zip(rows, masks, strict=True)] for masks in (fold.test, _learned(fold))]
-        test, train = (np.unique(np.concatenate(one)) for one in sets)
-        met = np.isin(test, train)
+        met = np.isin(np.unique(rows[fold.test]), rows[_learned(fold)])
         return float(met.mean()) if met.sum() > AT_REST else 0.0
 
     worst = max(map(shared, assignments))
-    distinct, *by_half = (len(np.unique(np.concatenate(one))) for one in (rows, *halves))
+    distinct, *by_half = (len(np.unique(one)) for one in (rows, *halves))
     # Coarse readings agree by chance, and then far more often in half of the columns than in all.
     if worst <= MOST_SHARED or min(by_half) < (1 - MOST_SHARED) * distinct:
         return ()

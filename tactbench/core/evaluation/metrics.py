@@ -58,7 +58,7 @@ class Metric:
 
 
 def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
-    """Return the summands of a mean over rows of what `error` makes of their differences."""
+    """Return the summands of a mean over rows of `error` of their differences."""
     return lambda y, predicted, _: np.column_stack([error(predicted - y), np.ones(len(y))])
 
 
@@ -151,7 +151,7 @@ def _excess(sums: FloatArray, _: int) -> FloatArray:
 
 
 EXCESS = Metric("excess_square", "regression", _squares, _excess)
-"""Mean square beyond the floor of the reference, below zero where chance has it so: what errors of force are ranked by.
+"""Mean square beyond the floor of the reference, below zero where chance has it so: errors of force are ranked by it.
 Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
 """
 SUMMED = {
@@ -159,7 +159,7 @@ SUMMED = {
     EXCESS.name: EXCESS,
     **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
 }
-"""What replicates may be summed for."""
+"""Metrics whose sums replicates keep."""
 
 
 def metric_called(name: str) -> Metric:
@@ -170,7 +170,7 @@ def metric_called(name: str) -> Metric:
 
 
 def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
-    """Return what stands beside the mean error: percentiles over all rows, and each component's own RMSE."""
+    """Return percentiles of the error over all rows, and each component's own RMSE."""
     error = distances(y, predicted)
     squares = np.mean((predicted - y) ** 2, axis=0)
     return {

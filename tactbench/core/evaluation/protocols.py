@@ -12,7 +12,7 @@ from tactbench.core.spec.quantity import Frozen
 
 
 class ProtocolSpec(Frozen):
-    """What is discarded, scaled and filtered, and on which data each of these is fitted."""
+    """The steps of discarding, scaling and filtering, and the data on which each is fitted."""
 
     name: str
     title: str
@@ -27,7 +27,7 @@ class ProtocolSpec(Frozen):
     scaled_by: Literal["each set", "training set"]
     """Whose mean and deviation scale a set."""
     window_over: Literal["kept samples", "consecutive samples"]
-    """What the mean filter runs over; never across recordings or parts."""
+    """Samples that the mean filter runs over; never across recordings or parts."""
     roles_only: bool = False
     """Only recordings with the roles train, validation and test can be used."""
     uses_test_statistics: bool = False
@@ -39,7 +39,7 @@ class ProtocolSpec(Frozen):
     k: int | None = Field(default=None, ge=0)
     """Samples that the mean filter looks back; None: as many as the estimator states or chooses."""
     probe: bool = False
-    """Asks what recordings give away, not what a sensor can do: allowed for every task, whether it lists it or not."""
+    """It asks for leaks of recordings, not for a sensor's skill, and is allowed for every task, listed or not."""
 
 
 KARL2016 = ProtocolSpec(
@@ -64,9 +64,8 @@ KARL2016_TRAINING_SCALE = KARL2016.model_copy(
         "scaled_by": "training set",
     }
 )
-"""The paper's protocol in everything but one: beside it, what scaling each set by itself is worth. The three-sigma rule
-still drops test rows by the test set's own statistics.
-"""
+"""The paper's protocol in everything but one: beside it, it shows the worth of scaling each set by itself. The
+three-sigma rule still drops test rows by the test set's own statistics."""
 
 DEPLOYABLE = ProtocolSpec(
     name="deployable",
@@ -76,9 +75,7 @@ DEPLOYABLE = ProtocolSpec(
     scaled_by="training set",
     window_over="consecutive samples",
 )
-"""What a sensor in use can do: tared before it is pressed, no statistic of the test set, causal windows, no row dropped
-by its label.
-"""
+"""As a sensor in use: tared before a press, no statistic of the test set, causal windows, no row dropped by label."""
 
 DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
     update={
@@ -87,7 +84,7 @@ DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
         "tare": False,
     }
 )
-"""The same without the tare: beside it, what taring is worth."""
+"""The same without the tare: beside it, it shows the worth of taring."""
 
 FIRST_FRAME = ProtocolSpec(
     name="first-frame",
@@ -97,7 +94,7 @@ FIRST_FRAME = ProtocolSpec(
     first_row_only=True,
     probe=True,
 )
-"""What does the reading before anything happened already tell? The hold is not dropped: it is what is asked about."""
+"""The answer from the reading before anything happened. The hold is not dropped, since the first row lies in it."""
 
 PROTOCOLS = {
     protocol.name: protocol
@@ -106,12 +103,12 @@ PROTOCOLS = {
 
 
 def is_probe(name: str) -> bool:
-    """Tell whether a protocol asks what recordings give away; an unknown name is none."""
+    """Return whether a protocol is a probe for leaks; an unknown name is none."""
     return name in PROTOCOLS and PROTOCOLS[name].probe
 
 
 def without_options(name: str) -> str:
-    """Return the name of a protocol without what follows its ``@``."""
+    """Return the name of a protocol without its options (``@…``)."""
     return name.partition("@")[0]
 
 

@@ -21,12 +21,12 @@ from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
 FEWEST = 30
-"""Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
+"""Independent unloaded samples that a floor needs (assumed): a deviation from 30 is known to 13 %."""
 
 
 @dataclass(frozen=True)
 class Floor:
-    """What is known of the reference of the recordings that were tested."""
+    """Unloaded readings of the reference of the tested recordings."""
 
     holds: dict[int, FloatArray]
     """By number of the recording (:func:`hold_of`)."""
@@ -63,7 +63,7 @@ class Floor:
 
 
 def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answers) -> tuple[Floor | None, str]:
-    """Return what the tested recordings' unloaded holds say of their reference, or None and why.
+    """Return the floor from the unloaded holds of the tested recordings, or None and the reason.
 
     Notes
     -----
@@ -98,7 +98,7 @@ def _no_hold(table: Table) -> str:
 
 
 def hold_of(y: npt.NDArray[Any]) -> FloatArray:
-    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order.
+    """Return squares and degrees of freedom of (n,) samples of an unloaded reference in time order, n at least 2.
 
     (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
     less one, or less than that where noise is correlated.
@@ -110,7 +110,7 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
 
 
 def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> tuple[float, Interval]:
-    """Return what a RMSE is beyond the floor, with its 95 % interval; None for its ends where there are too few units.
+    """Return the part of a RMSE beyond the floor, with its 95 % interval, without ends for too few units.
 
     Notes
     -----
@@ -135,7 +135,7 @@ def _root(excess: float) -> float:
 
 
 def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | None:
-    """Return (n,) the force [N] that was exerted at each test row; None where nobody knows it.
+    """Return (n,) the force [N] that was exerted at each test row; None where it is unknown.
 
     A simulated rig without a force loop follows its scene's profile exactly; there the profile is the truth, noise and
     filters of the reference are not in it. A real rig's truth is not known, nor that of a simulated loop, which is not

@@ -1,8 +1,8 @@
-"""What was repeated, and what a row keeps of it, so that scores can be compared later without the answers.
+"""The replicates of a row: sums by which scores can be compared later without the answers.
 
 ::
 
-    {"unit": "session",                  what a replicate is
+    {"unit": "session",                  word for a replicate
      "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
      "sums": [[…], …]                    the metric's summands over each replicate
@@ -36,7 +36,7 @@ def replicates(data: Dataset, name: str | None, tested: Answers) -> ReplicateUni
     """Return which unit of replication of that name every test row belongs to; None: all rows are one."""
     if name is None:
         return ReplicateUnits("", np.zeros(len(tested), dtype=np.int64), ("",))
-    values = at_rows(data.tables, [table.groups[name] for table in data.tables], tested)
+    values = at_rows(data, data.column(lambda table: table.groups[name]), tested)
     labels, codes = np.unique(values, return_inverse=True)
     return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
@@ -49,7 +49,7 @@ def summed(
     floor: Floor | None = None,
     truth: FloatArray | None = None,
 ) -> dict[str, Any]:
-    """Return what a row keeps of its replicates; `truth` is the force that was exerted, (n,), where it is known."""
+    """Return the replicates of a row; `truth` is the force that was exerted, (n,), where it is known."""
     strata = unit.strata(tested.y_true, n_classes)
     kept = {"unit": unit.name, "names": list(unit.labels), "strata": strata.tolist() if strata.any() else None}
     if metric.function is not None:
@@ -61,9 +61,10 @@ def summed(
 
     def against(y: npt.NDArray[Any]) -> dict[str, Any]:
         sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))
-        lines = [_without_needless_points(line) for line in sums.tolist()]
+        # Counts are written as whole numbers; all else keeps every digit.
+        lines = [[int(one) if one.is_integer() and abs(one) < 2**53 else one for one in line] for line in sums.tolist()]
         if n_classes:
-            lines = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
+            lines = [[value for place in np.flatnonzero(line) for value in (int(place), line[place])] for line in lines]
         return {"sums": lines, "own": _plain(own_scores(metric, sums, n_classes))}
 
     return {
@@ -76,22 +77,6 @@ def summed(
 
 def _plain(scores: FloatArray) -> list[float | None]:
     return [float(one) if np.isfinite(one) else None for one in scores]
-
-
-def recordings_right(tested: Answers) -> tuple[int, int] | None:
-    """Return how many recordings most answers to which are right, and how many were tested; None if one has classes."""
-    right = []
-    for place in np.unique(tested.recording):
-        mine = tested.recording == place
-        if np.ptp(tested.y_true[mine]):
-            return None  # no recording of several classes is right or wrong as a whole
-        right.append(np.bincount(tested.y_pred[mine]).argmax() == tested.y_true[mine][0])
-    return sum(map(bool, right)), len(right)
-
-
-def _without_needless_points(line: list[float]) -> list[float]:
-    """Return counts as whole numbers; all else keeps every digit."""
-    return [int(value) if value.is_integer() and abs(value) < 2**53 else value for value in line]
 
 
 def tables_of(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:

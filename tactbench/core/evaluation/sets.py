@@ -1,19 +1,19 @@
-"""From masks to X and y: what the protocol tares, discards, scales and filters."""
+"""From masks to X and y: rows are tared, discarded, scaled and filtered as the protocol has it."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.dataset import Dataset, Mask, Table
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.evaluation.splits import Assignment
 from tactbench.core.samples import FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import TaskSpec
@@ -98,25 +98,19 @@ class SetRows(Part):
     """Windows stay within one number."""
 
 
-def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> SetRows:
-    """Collect the rows of a set, one (n,) mask a recording, and drop what the protocol drops.
+def keep(data: Dataset, protocol: ProtocolSpec, rows: Mask, what: str, counts: Counter[str]) -> SetRows:
+    """Return those of the rows of a set, a mask over all rows, that the protocol keeps.
 
-    `counts` is told how many rows the three-sigma rule drops, which depends on the set, and messages say `what` it is.
+    `counts` gets the number of rows that the three-sigma rule drops; `what` names the set in messages.
     """
-    tables = data.tables
-    chosen = [mask & asked_for(table, protocol) for table, mask in zip(tables, masks, strict=True)]
-    sizes = [int(mask.sum()) for mask in chosen]
-    if sum(sizes) == 0:
+    chosen = rows & data.column(lambda table: asked_for(table, protocol))
+    if not chosen.any():
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
-
-    def joined(columns: Iterable[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        return np.concatenate([column[mask] for column, mask in zip(columns, chosen, strict=True)])
-
-    X = joined(tared(table) if protocol.tare else table.X for table in tables)
-    recording, place = np.repeat(np.arange(len(tables)), sizes), np.concatenate([np.flatnonzero(one) for one in chosen])
+    X = data.column(lambda table: tared(table) if protocol.tare else table.X, chosen)
+    recording, place = data.recording[chosen], np.flatnonzero(chosen)
     good = np.ones(len(X), dtype=bool)
     if protocol.three_sigma:
-        force = joined(np.full(len(one.row), np.nan) if one.force is None else one.force for one in tables)
+        force = data.column(lambda table: np.nan if table.force is None else table.force, chosen)
         good = _within_three_sigma(X, force, data.features, what, counts)
         if not good.any():
             raise DataError(
@@ -131,7 +125,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     else:
         segment = recording[good]
     y, time_s, row, labelled = (
-        joined(getattr(table, name) for table in tables)[good] for name in ("y", "time_s", "row", "labelled")
+        data.column(attrgetter(name), chosen)[good] for name in ("y", "time_s", "row", "labelled")
     )
     return SetRows(X[good], y, time_s, recording[good], row, labelled, segment)
 
@@ -206,29 +200,26 @@ def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, st
     return replace(data, tables=tuple(map(of, data.tables)))
 
 
-def apart(fold: Assignment, window: int, step: int) -> Assignment:
+def apart(fold: Assignment, data: Dataset, window: int, step: int) -> Assignment:
     """Return a fold without the training windows that have a row in common with a test window."""
     reach = (window - 1) // step
-
-    def clear(train: Mask, test: Mask) -> Mask:
-        near = np.convolve(test, np.ones(2 * reach + 1))[reach : reach + len(test)] if len(test) else test
-        return np.asarray(train & (near < 0.5))
-
-    return replace(fold, train=tuple(map(clear, fold.train, fold.test)))
+    near = [np.convolve(test, np.ones(2 * reach + 1))[reach : reach + len(test)] if len(test) else test
+            for test in data.parted(fold.test)]  # fmt: skip
+    return replace(fold, train=fold.train & (np.concatenate(near) < 0.5))
 
 
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
     """Return X and y of one fold: kept, scaled and filtered over `k` + 1 samples as the protocol has it.
 
-    `counts` is told what was left out, and which features never change.
+    `counts` gets the rows left out, and the features that never change.
     """
     train = keep(data, rules, assignment.train, "training", counts)
     for name, width in zip(data.features, np.ptp(train.X, axis=tuple(range(train.X.ndim - 1))), strict=True):
         if width == 0:
             counts[f"folds in which {name} never changes in training"] += 1
 
-    def scaled(masks: Sequence[Mask], what: str) -> Part:
-        kept = keep(data, rules, masks, what, counts)
+    def scaled(rows: Mask, what: str) -> Part:
+        kept = keep(data, rules, rows, what, counts)
         return part(kept, scale_of(rules, train, kept), k)
 
     test = scaled(assignment.test, "test")

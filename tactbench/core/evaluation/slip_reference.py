@@ -1,4 +1,4 @@
-"""What the reference of a recording says about slip."""
+"""Slip of a recording by its reference."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _CHANNELS = (
 
 @dataclass(frozen=True)
 class SlipReference:
-    """The reference's samples, and what they were labelled."""
+    """The reference's samples, and their labels."""
 
     t_ns: IntArray
     """(n,) nanoseconds since the first row of the sensor's clock"""
@@ -45,7 +45,7 @@ class SlipReference:
     """Whether the recording as a whole is a disturbance that is no slip"""
 
     def at(self, ends_ns: IntArray, values: npt.NDArray[Any], missing: float = np.nan) -> npt.NDArray[Any]:
-        """Return (k,) of (n,) values of samples that of the last one at or before each time.
+        """Return (k,) the value of the last sample at or before each time, from (n,) values of samples.
 
         It is `missing` before the first sample and after the last one's interval.
         """
@@ -62,7 +62,7 @@ class SlipReference:
 def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
     """Read and label the reference of a recording, times counted from `first_ns`.
 
-    `counts` is told how many of its samples were left out. Raises NotApplicable if a channel or the coefficient of
+    `counts` gets the number of samples left out. Raises NotApplicable if a channel or the coefficient of
     friction is missing, DataError if the coefficient is no number or the surface never rests.
     """
     name = recording.meta.name

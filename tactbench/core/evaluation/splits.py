@@ -1,11 +1,11 @@
-"""What is kept apart between training and test."""
+"""Splits: which rows train, validate and test, and the groups that these do not share."""
 
 from __future__ import annotations
 
 import re
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,13 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.dataset import Dataset, Mask
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
-Mask = npt.NDArray[np.bool_]
 Places = npt.NDArray[np.int64]
 FOLDS = 5
 """Folds of grouped and of shuffled splits."""
@@ -37,13 +36,12 @@ SHUFFLED_WHOLE_STAMP = f"{LEAKS}split shuffled deals recordings at random, of on
 
 @dataclass(frozen=True)
 class Assignment:
-    """Which rows of each recording are for what."""
+    """The rows that train, test and validate: masks over the rows of all recordings, one after the other."""
 
     name: str
-    train: tuple[Mask, ...]
-    """one (n,) mask a recording"""
-    test: tuple[Mask, ...]
-    validation: tuple[Mask, ...] | None = None
+    train: Mask
+    test: Mask
+    validation: Mask | None = None
     groups: str = "session"
     """Name of the groups that training and test do not share; also those of an inner split."""
 
@@ -61,7 +59,7 @@ class OwnSplit:
 
     @property
     def name(self) -> str:
-        """What rows and tables call it."""
+        """The name in rows and tables."""
         if isinstance(self._splitter, list):
             return f"{len(self._splitter)} given folds"
         return " ".join(repr(self._splitter).partition(" object at 0x")[0].split())
@@ -71,7 +69,7 @@ class OwnSplit:
         if not self._folds:
             given: Any = self._splitter
             try:
-                with warnings.catch_warnings():  # such groups tell what intervals are over
+                with warnings.catch_warnings():  # such groups are the units of intervals
                     warnings.filterwarnings("ignore", "The groups parameter is ignored")
                     pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
@@ -173,20 +171,20 @@ def _can(name: str, data: Dataset) -> bool:
     tables = [data.tables[place] for place in _open_to_folds(data)]
     if any(name not in table.groups for table in tables):
         return False  # rows of no known group could be related to either side
-    return len({value for table in tables for value in np.unique(table.groups[name][table.labelled])}) >= 2
+    return len(_sizes(data, _open_rows(data), name)) >= 2
 
 
-def used_rows(assignments: Sequence[Assignment]) -> tuple[Mask, ...]:
-    """Return one (n,) mask a recording: the rows that some fold trains, validates or tests on."""
-    sets = [masks for one in assignments for masks in (one.train, one.test, one.validation) if masks is not None]
-    return tuple(np.logical_or.reduce(masks) for masks in zip(*sets, strict=True))
+def used_rows(assignments: Sequence[Assignment]) -> Mask:
+    """Return the rows that some fold trains, validates or tests on, as a mask."""
+    sets = [mask for one in assignments for mask in (one.train, one.test, one.validation) if mask is not None]
+    return np.asarray(np.logical_or.reduce(sets))
 
 
-def without_part(data: Dataset, split: str, used: Sequence[Mask]) -> dict[str, int]:
+def without_part(data: Dataset, split: str, used: Mask) -> dict[str, int]:
     """Return how many recordings no fold uses, by their role; few shots leave recordings out by design."""
     if shots(split) is not None:
         return {}
-    unused = [meta.role for meta, mask in zip(data.metas, used, strict=True) if not mask.any()]
+    unused = [meta.role for meta, mask in zip(data.metas, data.parted(used), strict=True) if not mask.any()]
     return {
         f"recordings {f'of role {role}' if role else 'without a role'} that take no part in split {split}": count
         for role, count in Counter(unused).items()
@@ -226,8 +224,7 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
         return list(_in_session(data, gap))
     if split == "shuffled":
         return list(_shuffled(data, seed))
-    tables = [data.tables[place] for place in _open_to_folds(data)]
-    sizes = _sizes(tables, [table.labelled for table in tables], split)
+    sizes = _sizes(data, _open_rows(data), split)
     names = sorted(sizes)
     if split == "session":
         return [_held_out(data, split, {name}, name) for name in names]
@@ -242,54 +239,49 @@ def _open_to_folds(data: Dataset) -> list[int]:
     return free or list(range(len(data.tables)))
 
 
-def _masks(data: Dataset, chosen: Callable[[int, Table], Mask | bool]) -> tuple[Mask, ...]:
-    """Return one (n,) mask a recording, from its place and itself."""
-    return tuple(np.zeros(len(table.row), dtype=bool) | chosen(place, table) for place, table in enumerate(data.tables))
+def _open_rows(data: Dataset) -> Mask:
+    """Return the rows of the recordings that cross-validation may use, as a mask."""
+    return np.isin(data.recording, _open_to_folds(data))
 
 
 def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
-    """Return the official sets; of few shots the first `number` training sessions alone, without validation."""
+    """Return the official sets; of few shots only the first `number` training sessions, without validation."""
     train, validation, test = (
-        tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
+        data.column(lambda table: table.meta.role == role)  # noqa: B023
         for role in ("train", "validation", "test")
     )
     if number is not None:
-        first = training_sessions(data)[:number]
-        train, validation = _masks(data, lambda _, table: table.meta.session in first), ()
-    return Assignment(name, train, test, validation if any(mask.any() for mask in validation) else None)
+        train = np.isin(data.column(lambda table: table.meta.session), training_sessions(data)[:number])
+    return Assignment(name, train, test, validation if validation.any() and number is None else None)
 
 
 def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
     """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
-    places = _open_to_folds(data)
-    for session in sorted({data.metas[place].session for place in places}):
-        mine = _masks(data, lambda place, table: place in places and table.meta.session == session)  # noqa: B023
-        train, test = _cut_in_time(data, mine, gap, fewest=10)
-        if any(mask.any() for mask in test):
-            yield Assignment(session, train, test)
+    opened, session = _open_rows(data), data.column(lambda table: table.meta.session)
+    for name in np.unique(session[opened]).tolist():
+        train, test = _cut_in_time(data, opened & (session == name), gap, fewest=10)
+        if test.any():
+            yield Assignment(name, train, test)
 
 
-def _cut_in_time(
-    data: Dataset, masks: Sequence[Mask], gap: int, fewest: int
-) -> tuple[tuple[Mask, ...], tuple[Mask, ...]]:
+def _cut_in_time(data: Dataset, rows: Mask, gap: int, fewest: int) -> tuple[Mask, Mask]:
     """Return the first part in time of each recording and, after a gap, the last; none of fewer labelled rows."""
     before, after = [], []
-    for table, mask in zip(data.tables, masks, strict=True):
-        rows, number = np.flatnonzero(mask & table.labelled), np.arange(len(table.row))
-        first = rows[int(TRAIN_SHARE * len(rows))] if len(rows) >= fewest else len(number) + gap
-        before.append(mask & (number < first - gap) & (len(rows) >= fewest))
+    for table, mask in zip(data.tables, data.parted(rows), strict=True):
+        labelled, number = np.flatnonzero(mask & table.labelled), np.arange(len(table.row))
+        enough = len(labelled) >= fewest
+        first = labelled[int(TRAIN_SHARE * len(labelled))] if enough else len(number)
+        before.append(mask & (number < first - gap) & enough)
         after.append(mask & (number >= first))
-    return tuple(before), tuple(after)
+    return np.concatenate(before), np.concatenate(after)
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
-    """Say in the name of a fold that tests one single number whether training had any on both sides of it."""
-    if data.classes or any(table.y.ndim > 1 for table in data.tables):
+    """Add to the name of a fold that tests one single number whether training had numbers on both sides of it."""
+    y = data.column(lambda table: table.y)
+    if data.classes or y.ndim > 1:
         return fold
-    train, test = (
-        np.concatenate([table.y[mask & table.labelled] for table, mask in zip(data.tables, masks, strict=True)])
-        for masks in (fold.train, fold.test)
-    )
+    train, test = (y[rows & data.labelled] for rows in (fold.train, fold.test))
     if not len(train) or not len(test) or np.ptp(test) > 0:
         return fold
     between = train.min() < test[0] < train.max()
@@ -311,9 +303,13 @@ def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
 
 
 def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignment:
-    known = [place for place in _open_to_folds(data) if group in data.tables[place].groups]
-    test = _masks(data, lambda place, table: place in known and np.isin(table.groups[group], sorted(values)))
-    return Assignment(name, _masks(data, lambda place, _: place in known and ~test[place]), test, groups=group)
+    opened, held_out = _open_rows(data), np.isin(_labels(data, group), sorted(values))
+    return Assignment(name, opened & ~held_out, opened & held_out, groups=group)
+
+
+def _labels(data: Dataset, group: str) -> npt.NDArray[Any]:
+    """Return (rows,) labels of a group; empty ones of recordings that have none."""
+    return data.column(lambda table: table.groups.get(group, ""))
 
 
 def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
@@ -325,34 +321,30 @@ def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
         if data.classes:
             order.sort(key=lambda place: int(data.tables[place].y[data.tables[place].labelled][0]))
         folds = min(FOLDS, len(order))
-        dealt = {place: np.full(len(data.tables[place].row), at % folds) for at, place in enumerate(order)}
+        dealt: dict[int, Any] = {place: at % folds for at, place in enumerate(order)}
     else:
         dealt = {place: rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places}
-    for number in range(folds):
-        test = _masks(data, lambda place, _: place in dealt and dealt[place] == number)  # noqa: B023
-        train = _masks(data, lambda place, _: place in dealt and ~test[place])  # noqa: B023
-        yield Assignment(f"shuffled fold {number + 1}", train, test, groups="recording")
+    number = np.concatenate([np.broadcast_to(dealt.get(place, -1), len(table.row))
+                             for place, table in enumerate(data.tables)])  # fmt: skip
+    for fold in range(folds):
+        test = number == fold
+        yield Assignment(f"shuffled fold {fold + 1}", (number >= 0) & ~test, test, groups="recording")
 
 
-def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[tuple[Mask, ...], tuple[Mask, ...]]]:
+def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[Mask, Mask]]:
     """Return (train, validation) masks inside the training rows of `outer`, for choosing hyper-parameters.
 
     What the outer split keeps apart is kept apart here too: each session (or group) is left out once, in five folds
     where there are more than five. With a single one, the last fifth in time of each recording is held back; where
     recordings are answered whole, a fifth of them.
     """
-    groups, sizes = outer.groups, _sizes(data.tables, outer.train, outer.groups)
+    groups, sizes = outer.groups, _sizes(data, outer.train, outer.groups)
     if data.whole and len(sizes) < 2:
-        groups, sizes = "recording", _sizes(data.tables, outer.train, "recording")
-    if len(sizes) >= 2:
-        inner = []
-        for held_out in _dealt(sizes):
-            apart = [np.isin(table.groups.get(groups, ""), sorted(held_out)) for table in data.tables]
-            fit = tuple(mask & ~out for mask, out in zip(outer.train, apart, strict=True))
-            check = tuple(mask & out for mask, out in zip(outer.train, apart, strict=True))
-            inner.append((fit, check))
-        return inner
-    return [_cut_in_time(data, outer.train, gap, fewest=5)]
+        groups, sizes = "recording", _sizes(data, outer.train, "recording")
+    if len(sizes) < 2:
+        return [_cut_in_time(data, outer.train, gap, fewest=5)]
+    held_out = [np.isin(_labels(data, groups), sorted(values)) for values in _dealt(sizes)]
+    return [(outer.train & ~out, outer.train & out) for out in held_out]
 
 
 def with_validation(outer: Assignment, data: Dataset) -> Assignment:
@@ -360,13 +352,18 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
 
     Of the inner splits so many as it takes to validate on events and on disturbances, if there are any.
     """
-    classes, kinds = _classes_in(data, outer.train), _kinds_in(data, outer.train)
-    check = _masks(data, lambda *_: False)
+    y, disturbance = data.column(lambda table: table.y), data.column(lambda table: table.slip.disturbance)
+
+    def classes(rows: Mask) -> set[int]:
+        return set(y[rows & data.labelled].tolist())
+
+    check = np.zeros_like(outer.train)
     for _, more in inner_splits(data, outer):
-        check = tuple(one | other for one, other in zip(check, more, strict=True))
-        learn = tuple(mask & ~out for mask, out in zip(outer.train, check, strict=True))
-        if (_classes_in(data, check), _kinds_in(data, check)) == (classes, kinds):
-            if _classes_in(data, learn) == classes:
+        check = check | more
+        learn = outer.train & ~check
+        kinds = [(classes(rows), set(disturbance[rows].tolist())) for rows in (check, outer.train)]
+        if kinds[0] == kinds[1]:
+            if classes(learn) == classes(outer.train):
                 return replace(outer, train=learn, validation=check)
             break
     raise DataError(
@@ -376,38 +373,24 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
     )
 
 
-def _classes_in(data: Dataset, masks: Sequence[Mask]) -> set[int]:
-    tables = zip(data.tables, masks, strict=True)
-    return {int(one) for table, mask in tables for one in np.unique(table.y[mask & table.labelled])}
-
-
-def _kinds_in(data: Dataset, masks: Sequence[Mask]) -> set[bool]:
-    """Return whether recordings are disturbances, of those that the masks hold."""
-    return {table.slip.disturbance for table, mask in zip(data.tables, masks, strict=True) if mask.any()}
-
-
-def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counter[str]:
-    """Return how many labelled rows of the masks each group has."""
-    sizes: Counter[str] = Counter()
-    for table, mask in zip(tables, masks, strict=True):
-        if group in table.groups:
-            values, counts = np.unique(table.groups[group][mask & table.labelled], return_counts=True)
-            sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
-    return sizes
+def _sizes(data: Dataset, rows: Mask, group: str) -> dict[str, int]:
+    """Return how many of some rows each group has that are labelled."""
+    values, counts = np.unique(_labels(data, group)[rows & data.labelled], return_counts=True)
+    return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
 def over_rows(assignment: Assignment, made: Dataset, recorded: Dataset) -> Assignment:
-    """Return an assignment of what recordings were made to as one of all rows recorded.
+    """Return an assignment of derived rows (frames, windows) as one of all rows recorded.
 
     Of windows their last rows; all rows of a recording that was made to frames, or to one row.
     """
 
-    def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
-        return tuple(
+    def spread(rows: Mask) -> Mask:
+        return np.concatenate([
             np.isin(table.row, own.row[mask]) if own.X.ndim > 2
             else mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
-            for mask, own, table in zip(masks, made.tables, recorded.tables, strict=True)
-        )  # fmt: skip
+            for mask, own, table in zip(made.parted(rows), made.tables, recorded.tables, strict=True)
+        ])  # fmt: skip
 
     validation = None if assignment.validation is None else spread(assignment.validation)
     return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)

@@ -1,4 +1,4 @@
-"""What is done once in a process, before any clock is read: imports, and the first use of a library."""
+"""Work done once in a process before any clock is read: imports, and the first use of libraries."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def import_libraries() -> None:
 
 
 def rehearse(estimator: Estimator, kind: str) -> None:
-    """Have `estimator` learn and answer a few made-up rows of a question of this kind, with one thread.
+    """Fit `estimator` to a few made-up rows of a task of this kind and predict, with one thread.
 
-    What a library puts off until its first fit (looking for other libraries, generating code) takes it up to some
+    Libraries put off work until their first fit (looking for other libraries, generating code): some
     tenths of a second. Processes forked from here need not do it again.
     """
     import numpy as np

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.alarms import alarms
-from tactbench.core.events.metrics import EventScores, GroundTruth, score_events
+from tactbench.core.events.alarms import EventScores, GroundTruth, alarms, score_events
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import AlarmPolicy
 
 
 @dataclass(frozen=True)
 class ScoredRecording:
-    """A detector's score over one recording, and what happened in it."""
+    """A detector's score over one recording, and the recording's events."""
 
     t_ns: IntArray
     """(n,) when each score is known, the detector's compute time included [ns]."""

@@ -1,4 +1,4 @@
-"""Whether a contact sticks, slips in part or slips as a whole: from displacement and forces, never from the sensor."""
+"""Labels of a contact that sticks, slips in part or as a whole: from displacement and forces, never from the sensor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNDECIDED, STICK, INCIPIENT, GROSS = -1, 0, 1, 2
 
 @dataclass(frozen=True)
 class SlipLabels:
-    """What the reference says of one recording."""
+    """The labels of one recording by its reference."""
 
     state: IntArray
     """(n,) :data:`STICK`, :data:`INCIPIENT`, :data:`GROSS` or :data:`UNDECIDED` of each sample of the reference."""
@@ -29,7 +29,7 @@ def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float)
     """Return c/a, the radius that sticks over the contact's: ``(1 - Q/(mu P))^(1/3)``.
 
     Q is the tangential force, of either sign, P the normal one, and mu the static coefficient of friction, known or
-    measured on the reference alone.
+    measured on the reference.
 
     Notes
     -----
@@ -123,7 +123,7 @@ def spread(values: FloatArray, first: IntArray, end: IntArray) -> FloatArray:
 
 
 def extremes(values: FloatArray, first: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return (k, …) smallest and largest of each ``values[first:end]``; what `first` has where that is empty."""
+    """Return (k, …) smallest and largest of each ``values[first:end]``; the value at `first` where that is empty."""
     pairs = np.column_stack([first, end]).ravel()
     padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
     return np.minimum.reduceat(padded, pairs)[::2], np.maximum.reduceat(padded, pairs)[::2]

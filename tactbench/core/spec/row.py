@@ -161,11 +161,6 @@ class RestsOn(_Section):
     confusion: list[list[int]] | None = None
     """counts of answers, (true class, predicted class)"""
     classes: list[str | bool | int | float] = []
-    recordings_right: int | float | None = None
-    """test recordings of a classification most answers to which are right, as a mean over replicates; None where one
-    has several classes"""
-    recordings_asked: int | float | None = None
-    """all test recordings that were answered"""
     events: dict[str, float] = {}
     """figures of events, times in the unit of the name"""
     operating_points: list[dict[str, float]] = []

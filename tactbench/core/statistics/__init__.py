@@ -1,1 +1,1 @@
-"""What may be said of scores: intervals of differences, ranks, averages over tasks. See docs/statistics.md."""
+"""Statistics of scores: replicates, intervals of differences, ranks. See docs/statistics.md."""

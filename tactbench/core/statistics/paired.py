@@ -12,12 +12,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import own_scores, student_quantile, two_sided_p
-from tactbench.core.evaluation.metrics import SUMMED
+from tactbench.core.evaluation.interval import influences, own_scores, student_quantile, two_sided_p
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.row import TRUE, lower_is_better
-from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.replicates import FEWEST, counted
 
 Row = Mapping[str, Any]
@@ -28,6 +27,58 @@ EXCHANGES = 9_999
 """Ways tried of more."""
 SEED = 0x7AC7
 """Of these ways: the same rows have the same p-value, on any machine."""
+
+
+@dataclass(frozen=True)
+class PairableRows:
+    """Rows that were tested on the same replicates, and so can be paired."""
+
+    places: IntArray
+    """(n,) which of the rows given"""
+    names: tuple[str, ...]
+    strata: IntArray
+    """(replicates,) which replicates may stand in for each other"""
+    influence: FloatArray
+    """(n, replicates): a score's squared standard error is the sum of their squares, the covariance of two scores that
+    of their products"""
+    freedom: float
+    """degrees of freedom of the standard errors"""
+
+
+def together(rows: Sequence[Row]) -> list[PairableRows]:
+    """Return finished rows of one metric in groups of equal replicates; rows without usable ones are in none.
+
+    The influence of a replicate is the change of the score without it (:func:`influences`).
+    """
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for place, row in enumerate(rows):
+        kept = row.get("replicates")
+        if kept:
+            strata = tuple(kept["strata"] or [0] * len(kept["names"]))
+            mark = tuple(kept["names"]), strata, "scores" in kept, tuple(row["classes"]), row["metric"]
+            groups.setdefault(mark, []).append(place)
+    found = []
+    for (names, strata, scored, classes, metric), places in groups.items():
+        several, n, codes = [rows[place]["replicates"] for place in places], len(names), np.array(strata)
+        sizes = np.unique(codes, return_counts=True)[1]
+        if sizes.min() < (FEWEST if scored else 2):
+            continue
+        if scored:  # the score is their mean
+            scores = np.array([scores_of(one, metric) for one in several])
+            influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
+        else:
+            sums = tables_of(several, metric, len(classes))
+            without = sums.sum(axis=1, keepdims=True) - sums
+            influence = influences(own_scores(SUMMED[metric], without, len(classes)), codes)
+        good = np.isfinite(influence).all(axis=1)
+        where = np.array(places, dtype=np.int64)[good]
+        found.append(PairableRows(where, names, codes, influence[good], float(n - len(sizes))))
+    return found
+
+
+def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
+    """Return (replicates,) scores that a row keeps of its replicates: of `metric`, or beyond the floor."""
+    return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -63,17 +114,12 @@ def difference(first: Row, second: Row) -> Difference:
 
     Notes
     -----
-    Where both were tested on replicates of the same names, differences are taken replicate by replicate. The interval
-    is Student's, with the jackknife's standard error of the difference of scores over replicates (Efron and Stein 1981;
-    Cameron, Gelbach and Miller 2008 on t with few clusters), which widens by itself where there are few. The p-value is
-    that of exchanging the two answers within replicates, each way as likely as another if there is no difference: all
-    2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
-    replicates it cannot be below 2 / 2^n.
-
-    Where each replicate has a score of its own, the difference is that of the means over replicates; of errors of force
-    that have a floor, of what is beyond it.
-
-    Where the replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
+    Where both were tested on replicates of the same names, differences are taken replicate by replicate, by the
+    jackknife's standard error (Efron and Stein 1981; Cameron, Gelbach and Miller 2008 on t with few clusters). The
+    p-value is that of exchanging the two answers within replicates: all 2^n ways up to 12 replicates, else 9,999 drawn
+    (Phipson and Smyth 2010 on counting the observed one). Where each replicate has a score of its own, the difference
+    is that of the means over replicates; of errors of force that have a floor, of the errors beyond it. Where the
+    replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
 
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
@@ -189,11 +235,8 @@ def exchanged(first: Row, second: Row) -> tuple[float, float]:
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
     ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        apart = metric.score(sums[0].sum(axis=0) + moved, n_classes) - metric.score(
-            sums[1].sum(axis=0) - moved, n_classes
-        )
-    return _share(apart), smallest
+    one, other = sums.sum(axis=1)
+    return _share(own_scores(metric, one + moved, n_classes) - own_scores(metric, other - moved, n_classes)), smallest
 
 
 def _ways(n: int) -> tuple[IntArray, float]:
@@ -213,7 +256,7 @@ def _share(apart: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class FoldDifference:
-    """The mean difference over folds, and what can be said of it."""
+    """The mean difference over folds, with its interval and p-value."""
 
     mean: float
     low: float

@@ -1,4 +1,4 @@
-"""A rank, and what errors of force are ranked by: apart from what computes ranks, so that a table loads no numerics."""
+"""Ranks as tables show them; their computation, in `ranking`, loads numerics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Rank:
 
     place: int
     low: int | None
-    """best place that the 95 % interval holds; None where no interval can be told"""
+    """best place that the 95 % interval holds; None without an interval"""
     high: int | None
     """worst place that it holds"""
     tied: bool
@@ -28,7 +28,7 @@ class Rank:
 
     @property
     def unsure(self) -> bool:
-        """Whether it has another place, or cannot be told from some other cell."""
+        """Whether it shares its place, or might have another."""
         return self.tied or (self.low is not None and self.low != self.high)
 
 

@@ -12,7 +12,7 @@ from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import EXCESS
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.row import lower_is_better
-from tactbench.core.statistics.influence import PairableRows, scores_of, together
+from tactbench.core.statistics.paired import PairableRows, scores_of, together
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
 Row = Mapping[str, Any]
@@ -28,25 +28,20 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 
     Notes
     -----
-    A cell is *clearly better* than another if its score is, and the interval of their paired difference neither
-    contains 0 nor lies within the task's region of practical equivalence. Cells in order of their scores share a place
-    until one comes that all of those sharing it are clearly better than: it takes the place of its number in that
-    order. So two neighbours have different places only if the data separate them, a better score never has a worse
-    place, and what comes in behind changes no place before it.
+    A cell is *clearly better* than another if its score is, and the interval of their difference neither contains 0 nor
+    lies within the task's region of practical equivalence. Cells in order of their scores share a place until one comes
+    that all of those sharing it are clearly better than: it takes the place of its number in that order.
 
     `low` and `high` are the ranks that no comparison of two excludes, the shared place among them: 1 + the number of
     cells that are clearly better, and the number of cells that are not clearly worse, itself among them (Mogstad,
-    Romano, Shaikh and Wilhelm 2024, Inference for ranks, at the level of a single pair). Resampling the ranks
-    themselves covers too little where cells are close: ``benchmarks/coverage.py``.
+    Romano, Shaikh and Wilhelm 2024, Inference for ranks, at the level of a single pair).
 
-    Errors of force are ranked by what is beyond the floor of their reference, if all of them have one: by
-    ``score² - floor²``, whose sums over replicates are exact and whose differences are free of what two cells' floors
-    share. The region of practical equivalence is that of the roots: ``b² … (b + region)²`` for the better one's b.
+    Errors of force are ranked by ``score² - floor²``, if all have a floor; the region of practical equivalence is that
+    of the roots: ``b² … (b + region)²`` for the better one's b.
 
     Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
     as independent; their interval is Student's, of two degrees of freedom the smaller. Where each replicate has a score
-    of its own, the better median must agree with it. A row without replicates is told from none. Nothing is drawn at
-    random.
+    of its own, the better median must agree with it. A row without replicates is separated from none.
     """
     entered = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
     if not entered:
@@ -71,7 +66,7 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 def _clearly(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[IntArray, IntArray, IntArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return (n,) of cells in order of their errors what their ranks are made of.
+    """Return (n,) arrays from which ranks follow, of cells in order of their errors.
 
     How many are clearly better and how many clearly worse, the place, and whether it is clearly worse than the cell
     before and than the first.
@@ -88,7 +83,7 @@ def _clearly(
     for group in groups:
         variance[np.ix_(group.places, group.places)] -= 2 * (group.influence @ group.influence.T)
     bound = wide[np.minimum.outer(which, which)] * np.maximum(variance, 0.0)
-    ahead = np.subtract.outer(mean, mean)  # only what stands before a cell can be better
+    ahead = np.subtract.outer(mean, mean)  # only cells before it can be better
     clear = np.tril(np.subtract.outer(error, error) > 0) & (ahead > 0) & (ahead**2 > bound)
     if same > 0:
         clear &= ~(ahead <= near_to) | (ahead + np.sqrt(bound) > near_to)
@@ -105,7 +100,7 @@ def _clearly(
 def _differed(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (n,) what differences are taken of, its standard error and its degrees of freedom.
+    """Return (n,) numbers whose differences are tested, their standard errors and degrees of freedom.
 
     That is `error`, or the mean over replicates with scores of their own; a row without replicates has infinite ones.
     """

@@ -1,4 +1,4 @@
-"""One row a cell: what its replicates came to, in place of a row for each."""
+"""One row for each cell, in place of a row for each replicate."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _MEDIANS = (
 )  # fmt: skip
 """Numbers of a row whose median over replicates stands in the table."""
 _INTERVALS = {
-    "score": ("ci_low", "ci_high"),
-    "score_beyond_floor": ("beyond_floor_ci_low", "beyond_floor_ci_high"),
-    "true_score": ("true_ci_low", "true_ci_high"),
-    "reference_score": ("reference_ci_low", "reference_ci_high"),
+    "score": "",
+    "score_beyond_floor": "beyond_floor_",
+    "true_score": "true_",
+    "reference_score": "reference_",
 }
-"""Where the interval of a number stands."""
+"""Numbers with an interval, and how its keys begin."""
 
 
 def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -50,8 +50,8 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
         In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
         interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and of a
         single campaign whose split holds out five units, the replicates are what is held out, and the row's own
-        interval stays; of several seeds asked of the same recordings the one with the median score stands for all.
-        Times are medians over what one host measured. Recordings, answers and key are those of the first replicate.
+        interval stays; of several seeds on the same recordings the one with the median score stands for all.
+        Times are medians over the runs of one host. Recordings, answers and key are those of the first replicate.
 
     Notes
     -----
@@ -59,7 +59,7 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     `replicate_scores`, `seeds`, `score_min` and `score_max` (the range of the replicates' scores). `recordings_right`
     and `recordings_asked` are means over replicates.
 
-    The score that ranks is here and nowhere else decided: where all rows that may stand in one table know the error
+    The score that ranks is decided here: where all rows that may stand in one table know the error
     against the true force, `metric` is ``true_rmse`` and `score`, intervals and replicates are of that error; the error
     against the reference is under `reference_score`. An error beyond the floor, which estimates the true one, is then
     left out.
@@ -74,12 +74,8 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def _by_truth(rows: Sequence[Row]) -> list[Row]:
-    known: dict[tuple[Any, ...], bool] = {}
-    for row in rows:
-        if row["status"] == "done":
-            key = _ranked_together(row)
-            known[key] = known.get(key, True) and row.get("true_score") is not None
-    return [_true(row) if row["status"] == "done" and known[_ranked_together(row)] else row for row in rows]
+    unknown = {_ranked_together(row) for row in rows if row["status"] == "done" and row.get("true_score") is None}
+    return [_true(row) if row["status"] == "done" and _ranked_together(row) not in unknown else row for row in rows]
 
 
 def _true(row: Row) -> Row:
@@ -98,7 +94,7 @@ def _true(row: Row) -> Row:
 
 
 def against_reference(row: Row) -> Row:
-    """Return a row whose score is against the reference as it was recorded: what a published error of force is."""
+    """Return a row whose score is against the reference as it was recorded, as published errors of force are."""
     if row.get("reference_score") is None:
         return row
     return {
@@ -120,15 +116,11 @@ def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
     for row in rows:
         if row.get("is_baseline") and row["status"] == "done":
             by_group.setdefault(_group(row), []).append(row)
-    bars: dict[tuple[Any, bool], float | None] = {}
-    for group, members in by_group.items():
-        best = min if lower_is_better(members[0]["metric"]) else max
-        for timed in (False, True):
-            knowing = {"reference"} if timed else {"reference", "time"}
-            known = [one["score"] for one in members if one.get("looks_at") not in knowing]
-            bars[group, timed] = best(known, default=None)
     for row in rows:
-        row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
+        knowing = {"reference"} if row.get("looks_at") == "time" else {"reference", "time"}
+        able = [one for one in by_group.get(_group(row), ()) if one.get("looks_at") not in knowing]
+        best = min if able and lower_is_better(able[0]["metric"]) else max
+        row["baseline"] = best((one["score"] for one in able), default=None)
 
 
 def _name(row: Row) -> str:
@@ -146,7 +138,11 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
     if not done:
         return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, **named}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_recordings(done)
-    return {**found, **named, "remarks": _remarks(members, done), "findings": _told(done, "findings")}
+    stopped = [
+        f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}"
+        for row in members if row["status"] != "done"
+    ]  # fmt: skip
+    return {**found, **named, "remarks": [*_texts(done, "remarks"), *stopped], "findings": _texts(done, "findings")}
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -156,23 +152,21 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
     timed = next((row for row in done if row.get("fit_s") is not None), first)
     here = [row for row in done if row["host"] == timed["host"]]
-    found = dict(first) | {key: timed[key] for key in Cost.model_fields if key in timed}
-    for key in _MEDIANS:
-        if key in first:
-            found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
+    found = {**first, **{key: timed[key] for key in Cost.model_fields if key in timed}}
+    for key in [key for key in _MEDIANS if key in first]:
+        found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
     level = 0.0
-    for key, (low, high) in _INTERVALS.items():
-        if low in first:
+    for key, prefix in _INTERVALS.items():
+        if f"{prefix}ci_low" in first:
             values = [row.get(key) for row in done]
-            known = None if None in values else median_interval([float(value) for value in values])  # type: ignore[arg-type]
-            found[low], found[high] = (known.low, known.high) if known else (None, None)
+            known = None if None in values else median_interval(values)
+            found |= {f"{prefix}ci_{end}": getattr(known, end, None) for end in ("low", "high")}
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     events = [row.get("events") or {} for row in done]
-    alarms = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
-    points_of = [row.get("operating_points") or [] for row in done]
-    alike = len({len(points) for points in points_of}) == 1
+    alarms: list[Any] = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
+    points_of = [row.get("operating_points") or [] for row in done]  # a detector that has a threshold has none
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
@@ -181,18 +175,17 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
-        "events": _middle(events) | ({} if None in alarms else {"alarms": _mean(alarms)}),
-        "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
+        "events": _middle(events) | ({} if None in alarms else {"alarms": sum(alarms) / len(alarms)}),
+        "operating_points": [_middle(points) for points in zip(*points_of, strict=False)],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
-        **{key: _mean([row.get(key) for row in done]) for key in ("recordings_right", "recordings_asked")},
     }
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
-    """Return what is kept of each replicate, by which cells are compared."""
+    """Return the scores of each replicate, by which cells are compared."""
     kept: dict[str, Any] = {
         "unit": "replicate",
         "names": [str(row["seed"]) for row in done],
@@ -206,7 +199,7 @@ def _kept(done: Sequence[Row]) -> dict[str, Any]:
 
 
 def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the row of a cell whose replicates are what its split holds out; of several seeds the median one's.
+    """Return the row of a cell whose replicates are the units its split holds out; of several seeds the median one's.
 
     A row that does not keep their own scores has an interval over something else, and loses it.
     """
@@ -216,8 +209,8 @@ def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
     own, unit = kept.get("own") or [], str(kept.get("unit") or "session")
     found = {**row, **_counted(done, max(len(own), 1), unit, [one for one in own if one is not None])}
     if not own or row["ci_low"] is None:
-        ends = dict.fromkeys([end for both in _INTERVALS.values() for end in both if end in row])
-        found |= {**ends, "ci_method": "", "replicates": {}}
+        ends = [f"{prefix}ci_{end}" for prefix in _INTERVALS.values() for end in ("low", "high")]
+        found |= {**dict.fromkeys(end for end in ends if end in row), "ci_method": "", "replicates": {}}
     return found
 
 
@@ -238,12 +231,8 @@ def _median(values: Sequence[Any]) -> float | None:
     return median(known) if known else None
 
 
-def _mean(values: Sequence[Any]) -> float | None:
-    return None if None in values else sum(values) / len(values)
-
-
 def _chosen(done: Sequence[Row]) -> dict[str, Any]:
-    """Return what was chosen on validation data: of what replicates chose, the lower median."""
+    """Return the values chosen on validation data: the lower median over replicates."""
     names = dict.fromkeys(name for row in done for name in row["chosen"])
     return {name: median_low([row["chosen"][name] for row in done if name in row["chosen"]]) for name in names}
 
@@ -260,18 +249,10 @@ def _added(tables: Sequence[Any]) -> Any:
     return [[sum(counts) for counts in zip(*lines, strict=True)] for lines in zip(*tables, strict=True)]
 
 
-def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
-    """Return what rows remark, and which were stopped."""
-    stopped = [row for row in members if row["status"] != "done"]
-    texts = [f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped]
-    return [*_told(done, "remarks"), *texts]
-
-
-def _told(done: Sequence[Row], key: str) -> list[str]:
+def _texts(done: Sequence[Row], key: str) -> list[str]:
     """Return the texts that rows have under a key, those of a part of the replicates with their number."""
-    many = len(done)
     counts = Counter(text for row in done for text in dict.fromkeys(row.get(key) or ()))
-    return [text if n == many else f"in {n} of {many} replicates: {text}" for text, n in counts.items()]
+    return [text if n == len(done) else f"in {n} of {len(done)} replicates: {text}" for text, n in counts.items()]
 
 
 @dataclass(frozen=True)
@@ -284,7 +265,7 @@ class MedianInterval:
     """Coverage: 0.95, or that of the whole range where five replicates reach no more."""
 
 
-def median_interval(values: Sequence[float]) -> MedianInterval | None:
+def median_interval(values: Sequence[Any]) -> MedianInterval | None:
     """Return the 95 % interval of the median of what `values` were drawn from; None of fewer than five.
 
     Notes
@@ -292,7 +273,7 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     The interval between the k-th smallest and the k-th largest of n values holds the median with probability
     ``1 - 2 P(B < k)``, B binomial with n and 1/2, whatever the distribution is. Between the two k whose probabilities
     enclose 95 % the ends are interpolated [1]_: 95 % are covered of smooth distributions, of any continuous one no less
-    than :func:`least_coverage`. The range of five values holds it in 93.75 % only: the level says so.
+    than :func:`least_coverage`. The range of five values holds it in 93.75 % only, which is its level.
 
     References
     ----------
@@ -315,7 +296,7 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
 
 
 def least_coverage(n: int) -> float:
-    """Return what the interval of a median of `n` values, five or more, covers at least, of any distribution."""
+    """Return the least coverage of the interval of a median of `n` values, five or more, over all distributions."""
     return _coverage(n, 1) if n == FEWEST else _coverage(n, _depth(n) + 1)
 
 
@@ -336,7 +317,7 @@ def count_range(counts: Sequence[int], unit: str) -> str:
 
 
 def percent(n: int | None, unit: str | None) -> str:
-    """Return what intervals over `n` replicates, or sessions, cover, as text: ``95 %``."""
+    """Return the coverage of intervals over `n` replicates, or sessions, as text: ``95 %``."""
     return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"
 
 

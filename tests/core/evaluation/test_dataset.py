@@ -1,5 +1,6 @@
 """A recording on one clock: what belongs together, what is missing, what it is called."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
 
 
 def test_a_stream_the_sensor_lacks_is_a_reason_and_never_ignored(tmp_path):
-    with pytest.raises(NotApplicable, match="needs a vibration stream; made has none"):
+    with pytest.raises(NotApplicable, match="vibration"):
         load_dataset(force_task(features=("taxel", "ac_pressure")), sessions(tmp_path))
 
 
@@ -51,7 +52,7 @@ def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
     (table,) = load_dataset(force_task(), [path]).tables
     np.testing.assert_allclose(table.y, late, rtol=1e-12)
     path = two_streams(tmp_path / "b.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
-    with pytest.raises(DataError, match="'fz' is recorded in 'count', which is no 'N'"):
+    with pytest.raises(DataError, match=r"'fz'.*'count'.*'N'"):
         load_dataset(force_task(), [path])
 
 
@@ -66,7 +67,7 @@ def test_an_answer_from_the_time_alone_needs_a_clock(tmp_path):
     timed, untimed = (sessions(tmp_path / name, "ab", t_ns=t_ns) for name, t_ns in (("t", "regular"), ("u", None)))
     assert evaluated(force_task(), timed, "time-index", split="session").score < 1e-9
     assert evaluated(force_task(), untimed, split="session").score > 0
-    with pytest.raises(NotApplicable, match="time-index looks at the time alone, which not all"):
+    with pytest.raises(NotApplicable, match="time-index"):
         evaluated(force_task(), untimed, "time-index", split="session")
 
 
@@ -79,7 +80,7 @@ def test_samples_that_a_faster_stream_lacks_are_left_out_of_it_and_counted(tmp_p
     )  # fmt: skip
     path = two_streams(tmp_path / "a.h5", (slow, slow), (fast, values), (slow, slow), labels={"kind": "a"})
     data = load_dataset(whole, [path])
-    assert data.counts["rows of fast left out because a channel has no sample"] == 4
+    assert [n for text, n in data.counts.items() if "fast" in text] == [4]
     assert [len(one.data) for one in data.tables[0].readings] == [10, 196]
 
 
@@ -87,7 +88,7 @@ def test_flagged_samples_are_kept_and_counted(tmp_path):
     quality = np.zeros((50, 3), dtype=np.uint8)
     quality[3:10, 0], quality[20, 1] = Quality.SATURATED, Quality.SUSPECT
     data = load_dataset(force_task(), sessions(tmp_path, "a", 50, quality=quality))
-    assert (data.counts["saturated samples kept"], data.counts["suspect samples kept"]) == (7, 1)
+    assert {text.split()[0]: n for text, n in data.counts.items()} == {"saturated": 7, "suspect": 1}
     assert len(data.tables[0].row) == 50
 
 
@@ -102,11 +103,11 @@ def test_time_that_does_not_run_forward_is_refused(tmp_path):
 def test_several_sensors_and_copies_are_refused_by_name(tmp_path):
     (path,) = sessions(tmp_path, "a", n=50)
     other = record(tmp_path / "b.h5", *ramp(1, n=50), called="raw")
-    with pytest.raises(DataError, match="'a' of made and 'b' of raw"):
+    with pytest.raises(DataError, match=r"made.*raw"):
         load_dataset(force_task(), [path, other])
     (tmp_path / "again").mkdir()
     copy = Path(shutil.copy(path, tmp_path / "again"))
-    with pytest.raises(DataError, match="'a' is given twice"):
+    with pytest.raises(DataError, match="given twice"):
         load_dataset(force_task(), [path, copy])
 
 
@@ -127,34 +128,35 @@ def less(n, rows):
 
 
 @pytest.mark.parametrize(
-    ("made", "more", "said"),
+    ("made", "more", "numbers"),
     [
-        (whole, {}, None),
-        (whole, {"t_ns": gappy}, "in 1 of 3 recordings: 1 gaps in taxels and force_torque: up to 0.51 s"),
-        (whole, {"t_ns": lambda n: gappy(1, 100, 50 + n)}, "in 3 of 3 recordings, such as 0: 1 gaps"),
-        (whole, {"t_ns": gappy, "simulated": lambda n: True}, None),  # no clock can have failed
-        (lambda n: (whole(n)[0] * [1, 1, n != 1], whole(n)[1]), {}, None),  # nothing touched it
-        (lambda n: less(n, 29), {}, None),
-        (lambda n: less(n, 30), {}, "5% of 600 rows left out: 30 without a force sample"),
-        (lambda n: less(n, 200), {}, "1 of 3 recordings left out, without any force sample: 1"),
+        (whole, {}, ""),
+        (whole, {"t_ns": gappy}, "1/3/1/0.51"),  # in one recording of three, one gap of so many seconds
+        (whole, {"t_ns": lambda n: gappy(1, 100, 50 + n)}, "3/3/0/1"),  # in all, such as 0, one gap
+        (whole, {"t_ns": gappy, "simulated": lambda n: True}, ""),  # no clock can have failed
+        (lambda n: (whole(n)[0] * [1, 1, n != 1], whole(n)[1]), {}, ""),  # nothing touched it
+        (lambda n: less(n, 29), {}, ""),
+        (lambda n: less(n, 30), {}, "5/600/30"),  # percent of the rows, and how many have no force
+        (lambda n: less(n, 200), {}, "1/3/1"),  # one recording of three without any, called 1
     ],
 )  # fmt: skip
-def test_what_bears_on_a_score_stands_beside_it(tmp_path, made, more, said):
+def test_what_bears_on_a_score_stands_beside_it(tmp_path, made, more, numbers):
     paths = [
         record(tmp_path / f"{n}.h5", *made(n), session=f"{n}", **{key: of(n) for key, of in more.items()})
         for n in range(3)
     ]
     found = evaluated(force_task(), paths, split="session").findings
-    assert len(found) == (said is not None)
-    assert all(text.startswith(said) for text in found)
+    assert len(found) == bool(numbers)
+    assert all("/".join(re.findall(r"[0-9.]+", text)).startswith(numbers) for text in found)
 
 
-@pytest.mark.parametrize(("lost", "named"), [(4, "0, 1, 2, 3"), (5, "0, 1, 2, 3, …")])
-def test_of_many_recordings_that_are_left_out_the_first_are_named(tmp_path, lost, named):
+@pytest.mark.parametrize("lost", [4, 5])
+def test_of_many_recordings_that_are_left_out_the_first_are_named(tmp_path, lost):
     paths = [record(tmp_path / f"{n}.h5", *ramp(n, n=20)) for n in range(lost, 7)]
     paths += [record(tmp_path / f"{n}.h5", ramp(n, n=20)[0], np.full(20, np.nan)) for n in range(lost)]
     (found,) = load_dataset(force_task(), sorted(paths)).findings
-    assert found.endswith(f"without any force sample: {named}")
+    assert re.findall("[0-9]", found.rpartition(":")[2]) == list("0123")
+    assert found.endswith("…") == (lost > 4)
 
 
 def test_a_fault_of_a_channel_that_the_task_does_not_look_at_is_no_finding(tmp_path):
@@ -170,11 +172,11 @@ def test_clocks_that_never_meet_are_an_error_with_both_spans(tmp_path):
     apart, good = (
         two_streams(tmp_path / f"{name}.h5", (t, t), (t, t), (t + by, t)) for name, by in (("a", 36e5), ("b", 0))
     )
-    spans = "slow runs from 0.000 to 0.990 s, and fz from 3600.000 to 3600.990 s: it begins 3600.000 s later"
-    with pytest.raises(DataError, match=f"near a force sample in time: in 'a', {spans}"):
+    spans = r"slow.*0\.000.*0\.990.*fz.*3600\.000.*3600\.990"
+    with pytest.raises(DataError, match=rf"'a'.*{spans}"):
         load_dataset(force_task(), [apart])
     (found,) = load_dataset(force_task(), [apart, good]).findings
-    assert found == f"1 of 2 recordings left out, without any force sample: a (a: {spans})"
+    assert re.search(f"a: {spans}", found)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
+from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import assumed
@@ -28,7 +29,7 @@ OLS = load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
 
 
 def reading_delay_ms(data, name="deployable", k=K):
-    return stated_delay_ms(data, data, TASK, protocol_called(name), OLS, k)
+    return stated_delay_ms(TaskData(TASK, protocol_called(name), "roles", data, data, ()), OLS, k)
 
 
 @pytest.mark.parametrize("name", [name for name in PROTOCOLS if name != "first-frame"])

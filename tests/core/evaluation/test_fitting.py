@@ -1,5 +1,6 @@
 """What is done with estimators that misbehave: they may come from anybody."""
 
+import re
 import warnings
 from collections import Counter
 from functools import partial
@@ -36,13 +37,13 @@ class Answering:
     ("given", "n_classes", "says"),
     [
         (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
-        (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
+        (np.array([0.0, np.nan, np.inf]), 0, "2 values"),
         (np.array(["a", "b", "c"]), 3, "type"),
         (np.array([0.0, 0.5, 1.0]), 3, "regressor"),
     ],
 )
 def test_an_answer_that_cannot_be_scored_is_refused_naming_the_estimator(given, n_classes, says):
-    with pytest.raises(PluginContractError, match=f"'theirs' answered 3 rows with .*{says}"):
+    with pytest.raises(PluginContractError, match=rf"'theirs'.*{says}"):
         answers(Answering(given), np.zeros((3, 2)), "theirs", n_classes)
 
 
@@ -50,8 +51,9 @@ def test_what_an_estimator_warns_of_is_counted_and_what_it_refuses_is_an_error_u
     counts = Counter()
     for _ in range(2):
         fit(Answering(None, "did not converge"), np.zeros((3, 1)), np.arange(3), "theirs", counts)
-    assert counts == {"fits of theirs with a RuntimeWarning": 2}
-    with pytest.raises(DataError, match="'theirs' could not be fitted to 3 rows of 1 features: too small"):
+    ((what, n),) = counts.items()
+    assert ("theirs" in what, what.split()[-1], n) == (True, "RuntimeWarning", 2)
+    with pytest.raises(DataError, match=r"'theirs'.*too small"):
         fit(Answering(None, ValueError("too small")), np.zeros((3, 1)), np.arange(3), "theirs", Counter())
 
 
@@ -63,7 +65,7 @@ def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
     ]
     result = evaluated(force_task(), paths, "mean", split="roles")
     assert "r2" not in result.scores
-    with pytest.raises(DataError, match="r2 of 1600 test rows is undefined"):
+    with pytest.raises(DataError, match=r"r2.*1600"):
         evaluated(force_task(metric="r2"), paths, "mean", split="roles")
 
 
@@ -96,7 +98,7 @@ def test_a_number_that_cannot_be_computed_with_is_named(tmp_path):
     X, force = ramp(0, n=200)
     for column, name in ((force, "the target"), (X[:, 1], "t1")):
         column[100:] = 1e300
-        with pytest.raises(DataError, match=rf"In recording '{name}', {name} reaches 1e\+300"):
+        with pytest.raises(DataError, match=rf"'{name}', {name}.*1e\+300"):
             load_task(force_task(), [record(tmp_path / f"{name}.h5", X, force)], "deployable")
 
 
@@ -104,11 +106,11 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
     paths = [record(tmp_path / f"{n}.h5", *ramp(n), session=f"{n}", labels={"kind": "abc"[n]}) for n in range(3)]
     result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
-    assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.findings
+    assert [re.findall("'(.)' in (.)", found) for found in result.findings] == [[("a", "0"), ("b", "1"), ("c", "2")]]
 
 
 def test_answers_that_overflow_are_named(tmp_path):
     paths = sessions(tmp_path, "ab", n=100)
     far = Answering(np.full(100, 1e308))
-    with pytest.raises(PluginContractError, match=r"'Answering' answered with numbers up to 1e\+308: .* overflows"):
+    with pytest.raises(PluginContractError, match=r"'Answering'.*1e\+308"):
         evaluated(force_task(), paths, PLAIN, given=far)

@@ -30,7 +30,7 @@ def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path)
         return X, force
 
     kept, _, counts = kept_rows(roles(tmp_path, with_outliers))
-    assert counts["test rows with force beyond three sigma"] == 1
+    assert [n for text, n in counts.items() if "force" in text] == [1]
     X, force = with_outliers(2)
     late = np.column_stack([X, force])[600:]
     by_hand = (np.abs(late - late.mean(axis=0)) <= 3 * late.std(axis=0)).all(axis=1)
@@ -46,7 +46,7 @@ def test_each_set_is_scaled_by_its_own_mean_and_deviation_all_its_recordings_poo
     # Means of 2000 z-scores: rounding only.
     np.testing.assert_allclose(one.X.mean(axis=0), 0.0, atol=1e-10)
     np.testing.assert_allclose(one.X.std(axis=0), 1.0, atol=1e-10)
-    assert np.abs(one.X[one.recording == 3].mean(axis=0)).max() > 0.1, "not each recording by itself"
+    assert np.abs(one.X[one.recording == 3].mean(axis=0)).max() > 0.1  # not each recording by itself
 
 
 def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
@@ -58,7 +58,7 @@ def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
     paths = roles(tmp_path, stuck)
     _, one, _ = kept_rows(paths)
     assert not one.X[:, 2].any()
-    assert run(paths).counts["folds in which t2 never changes in training"] == 1
+    assert [n for text, n in run(paths).counts.items() if "t2" in text] == [1]
 
 
 def run(paths, estimator="lasso", **more):
@@ -91,7 +91,7 @@ def test_hyper_parameters_are_chosen_on_validation_and_never_see_the_test_set(tm
 
 def test_it_needs_the_three_roles_and_no_other_split(tmp_path):
     paths = roles(tmp_path)
-    with pytest.raises(NotApplicable, match="by roles only"):
+    with pytest.raises(NotApplicable, match="roles"):
         run(paths, split="session")
     with pytest.raises(NotApplicable, match="deployable"):
         run(paths[:2])

@@ -46,7 +46,7 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
     assert result.ci_method.startswith("jackknife over 24 recordings ")
-    assert "one answer a recording, from deviation, mean-step" in result.remarks
+    assert any("deviation, mean-step" in one for one in result.remarks)
 
 
 def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
@@ -68,22 +68,21 @@ def test_splits_keep_recordings_whole(tmp_path):
     data = load_dataset(task(), paths)
     for split in ("recording", "shuffled"):
         for fold in make_splits(data, split, 1):
-            for train, test in zip(fold.train, fold.test, strict=True):
-                assert (train == train[0]).all()
-                np.testing.assert_array_equal(test, ~train)
-    tested = [np.flatnonzero([mask.any() for mask in fold.test]) for fold in make_splits(data, "shuffled", 1)]
-    assert {sum(data.tables[place].y[0] for place in fold) for fold in tested} <= {3, 4}, "16 of 24 are stable"
-    assert "deals recordings at random" in run(task(), paths, "shuffled").stamps[0]
+            np.testing.assert_array_equal(fold.test, ~fold.train)
+            assert all((rows == rows[0]).all() for rows in data.parted(fold.test))
+    tested = [np.unique(data.recording[fold.test]) for fold in make_splits(data, "shuffled", 1)]
+    assert {sum(data.tables[place].y[0] for place in fold) for fold in tested} <= {3, 4}  # 16 of 24 are stable
+    assert "random" in run(task(), paths, "shuffled").stamps[0]
 
 
 def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path):
     halves = {name: np.repeat([1, 2], 20) for name in ("slip", "press")}
-    with pytest.raises(NotApplicable, match="'in-session' cuts recordings in time"):
+    with pytest.raises(NotApplicable, match="'in-session'"):
         run(task(), sequences(tmp_path), "in-session")
-    with pytest.raises(UsageError, match="cannot be split by 'press'"):
+    with pytest.raises(UsageError, match="'press'"):
         run(task(), sequences(tmp_path / "b", annotations={"press": halves["press"]}), "press")
     changing = record(tmp_path / "c.h5", np.ones((40, 2)), annotations=halves)
-    with pytest.raises(NotApplicable, match="asks one answer of each recording, and label 'slip' changes within 'c'"):
+    with pytest.raises(NotApplicable, match=r"'slip'.*'c'"):
         run(task(), [changing])
 
 
@@ -192,4 +191,4 @@ def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path, reduce):
     result = run(asked, paths, estimator="ols")
     tested = result.sets["test"]
     assert tested.y_true == pytest.approx(getattr(forces, reduce)(axis=1)[tested.recording])
-    assert result.score < 1e-9, "the range is the largest force, and the mean a share of it: rounding only"
+    assert result.score < 1e-9  # the range is the largest force, and the mean a share of it: rounding only

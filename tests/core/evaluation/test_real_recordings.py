@@ -48,7 +48,7 @@ def folds(result):
 
 
 def test_rows_without_a_load_cell_sample_are_counted_and_forces_are_newtons(presses):
-    assert presses.counts["of 7200 rows have no force sample and were left out"] == 2 * 1740
+    assert [n for text, n in presses.counts.items() if "7200" in text] == [2 * 1740]
     largest = [table.y[table.labelled].max() for table in presses.tables]
     assert max(largest) == pytest.approx(34.154, abs=0.002)
 

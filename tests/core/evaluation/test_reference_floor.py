@@ -99,11 +99,7 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
 
 @pytest.mark.parametrize(
     ("how", "why"),
-    [
-        ({"hold": 0.0}, "states no unloaded hold"),
-        ({"drive": ForceLoop()}, "force loop"),
-        ({"hold": 2.0}, f"fewer than {FEWEST}"),
-    ],
+    [({"hold": 0.0}, "no unloaded"), ({"drive": ForceLoop()}, "force loop"), ({"hold": 2.0}, f"than {FEWEST}")],
 )
 def test_without_a_hold_that_tells_there_is_no_floor_and_the_row_says_why(tmp_path, how, why):
     result = result_of(tmp_path / "a", **how)

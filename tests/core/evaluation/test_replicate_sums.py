@@ -1,14 +1,12 @@
 """What an interval resamples, and what a row keeps of it."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.replicate_sums import recordings_right, tables_of
-from tactbench.core.samples import Answers
+from tactbench.core.evaluation.replicate_sums import tables_of
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
@@ -61,13 +59,3 @@ def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     kept = evaluated(force_task(splits=("press",)), [path], split="press").replicates
     assert (kept["unit"], kept["names"]) == ("press", [f"1/{number}" for number in range(6)])
     assert [rows for _, rows in kept["sums"]] == [5, 5, 10, 10, 10, 10]
-
-
-def test_recordings_are_right_by_most_of_their_samples_and_not_counted_where_one_has_several_classes():
-    recording = np.repeat([0, 1, 2], 10)
-    y, answered = np.repeat([0, 1, 2], 10), np.repeat([0, 1, 2], 10)
-    answered[:1], answered[10:18] = 1, 2
-    zeros = 0 * recording
-    tested = Answers(y, answered, recording, zeros, zeros, 0.0 * zeros, 0.0 * zeros)
-    assert recordings_right(tested) == (2, 3)
-    assert recordings_right(replace(tested, recording=zeros)) is None

@@ -63,7 +63,7 @@ def test_what_the_words_mean():
     assert (value(X, "minimum"), value(X, "maximum"), value(X, "range")) == (1.0, 6.0, 5.0)
     assert value(X, "change") == 5.0
     assert value(X, "mean-step") == pytest.approx((2 + 1 + 4) / 3)
-    assert value([0.1] * 1000, "deviation") == 0.0, "what never changes has no deviation, not its rounding"
+    assert value([0.1] * 1000, "deviation") == 0.0  # not its rounding
 
 
 def test_a_band_passes_its_own_and_stops_the_others():
@@ -77,14 +77,14 @@ def test_a_band_passes_its_own_and_stops_the_others():
 
 
 def test_a_band_that_the_rate_does_not_show_is_no_feature():
-    with pytest.raises(NotApplicable, match=r"sampled at 30 Hz, which shows nothing above 15 Hz"):
+    with pytest.raises(NotApplicable, match=r"30 Hz.*15 Hz"):
         summary_of(replace(stream(np.zeros(100)), rate_hz=30.0), summary("band-energy"), "r")
 
 
 def test_a_window_in_seconds_needs_a_clock_and_a_recording_that_is_long_enough():
     whole, window = stream(np.arange(100.0)), summary("mean", start=0.5, end=1.0, unit="s")
     assert summary_of(whole, window, "r") == pytest.approx(np.arange(50, 100).mean())
-    with pytest.raises(NotApplicable, match="has no clock"):
+    with pytest.raises(NotApplicable, match="clock"):
         summary_of(replace(whole, time_s=None), window, "r")
-    with pytest.raises(DataError, match=r"'r' has 0.98 s of taxels"):
+    with pytest.raises(DataError, match=r"'r'.*0.98"):
         value(np.arange(99.0), "mean", start=0.5, end=1.0, unit="s")

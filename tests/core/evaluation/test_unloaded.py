@@ -15,7 +15,6 @@ from tactbench.core.spec.quantity import assumed
 
 from .made import evaluated, force_task, held, record, roles
 
-NOT_TARED = "not tared: no recording states an unloaded hold"
 TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
 HOLD, ROWS = 40, 200
 
@@ -41,7 +40,7 @@ def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_
     same = [answered(paths, "deployable") for paths in (plain, shifted)]
     np.testing.assert_allclose(same[1].sets["test"].y_pred, same[0].sets["test"].y_pred, atol=1e-9)
     untared = [answered(paths, "deployable-untared").score for paths in (plain, shifted)]
-    assert untared[1] > 10 * untared[0], "what is not tared feels them"
+    assert untared[1] > 10 * untared[0]
     assert [one.tare_s for one in same] == [0.4, 0.4]
 
 
@@ -67,13 +66,13 @@ def test_recordings_without_a_hold_are_as_they_are_and_the_row_says_so(tmp_path)
         paths = three(tmp_path / name, (5.0, 5.0, 5.0), **how)
         result = answered(paths, "deployable")
         assert result.tare_s is None
-        assert NOT_TARED in result.remarks
+        assert any("not tared" in one for one in result.remarks)
         assert result.score == answered(paths, "deployable-untared").score
 
 
 def test_recordings_of_which_some_cannot_be_tared_are_refused(tmp_path):
     paths = three(tmp_path / "a")
     bare = record(tmp_path / "bare.h5", np.ones((ROWS, 3)), np.ones(ROWS), role="train", session="bare")
-    with pytest.raises(NotApplicable, match=r"3 of 4 recordings .* 'bare'"):
+    with pytest.raises(NotApplicable, match=r"3 of.*'bare'"):
         answered([*paths, bare], "deployable")
     assert answered([*paths, bare], "deployable-untared").score > 0

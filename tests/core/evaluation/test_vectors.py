@@ -61,8 +61,8 @@ def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estima
 def test_rows_without_a_component_have_no_label_and_intervals_and_replicates_are_of_the_vectors(tmp_path):
     result = run(place_task(), presses(tmp_path, missing=15))
     assert result.n_test == 6 * 45
-    assert result.counts["of 720 rows have no position samples called 'x' and 'y' and were left out"] == 12 * 15
-    assert result.ci_method.startswith("jackknife over 6 sessions")
+    assert [n for text, n in result.counts.items() if "'x' and 'y'" in text] == [12 * 15]
+    assert "6 sessions" in result.ci_method
     assert result.ci_low < result.score < result.ci_high
     sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)
     assert sums[0] / sums[1] == pytest.approx(result.score)

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.alarms import alarms
+from tactbench.core.events.alarms import alarms, score_events
 from tactbench.core.events.curve import threshold_curve
-from tactbench.core.events.metrics import score_events
 from tests.core.events.made import policies, scored_recordings
 
 

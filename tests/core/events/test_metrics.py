@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from tactbench.core.events.metrics import TimeBase, displacement_at_detection, score_events
+from tactbench.core.events.alarms import displacement_at_detection, score_events, time_base
 from tactbench.core.spec.events import nanoseconds
 from tests.core.events.made import MS, policies, policy, seconds, truth, truths
 
@@ -54,10 +54,10 @@ def test_the_time_base_holds_what_its_definition_says_millisecond_by_millisecond
             for onset, end in truth_of.event_ns.tolist()
         )
         expected.append(named and not taken)
-    base = TimeBase.of(truth_of, rules)
-    assert np.array_equal(base.holds(clock), expected)
+    held, length_ns = time_base(truth_of, rules, clock)
+    assert np.array_equal(held, expected)
     # Its length is the number of held milliseconds but for the ends of events, which hold one nanosecond more.
-    assert abs(base.length_ns - sum(expected) * MS) <= MS * len(truth_of.event_ns)
+    assert abs(length_ns - sum(expected) * MS) <= MS * len(truth_of.event_ns)
 
 
 def test_displacement_at_detection_is_what_the_surface_moved_since_the_onset():

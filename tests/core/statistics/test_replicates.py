@@ -59,7 +59,7 @@ def test_figures_of_replicates_are_their_medians_counts_their_sums_and_means_are
         return {
             "events": {"alarms": n, "misses": 10 * n}, "operating_points": [{"recall": n / 4}, {"recall": n / 8}],
             "confusion": [[n, 0], [1, n]], "counts": {"rows left out": n}, "chosen": {"k": n},
-            "scores": {"r2": n / 10}, "recordings_right": n, "delay_parts_ms": {"window": n, "link": 1.0},
+            "scores": {"r2": n / 10}, "delay_parts_ms": {"window": n, "link": 1.0},
             "answer_delay_ms": n + 1.0,
         }  # fmt: skip
 
@@ -67,13 +67,12 @@ def test_figures_of_replicates_are_their_medians_counts_their_sums_and_means_are
     (found,) = over_replicates(rows)
     expected = of(2) | {
         "events": {"alarms": 3.0, "misses": 20}, "confusion": [[9, 0], [3, 9]], "counts": {"rows left out": 9},
-        "recordings_right": 3.0,
     }  # fmt: skip
     assert {name: found[name] for name in expected} == expected
     assert (found["ci_method"], found["replicates"]) == ("", {})
-    rows[0] |= {"operating_points": [], "events": {}, "confusion": None, "recordings_right": None}
+    rows[0] |= {"operating_points": [], "events": {}, "confusion": None}
     (found,) = over_replicates(rows)
-    assert (found["operating_points"], found["recordings_right"], found["confusion"]) == ([], None, None)
+    assert (found["operating_points"], found["confusion"]) == ([], None)
     assert found["events"] == {"alarms": 4.0, "misses": 40}
 
 
