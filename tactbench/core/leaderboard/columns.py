@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
@@ -63,7 +62,6 @@ _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
 """Columns whose text depends on the other rows of the block."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
-    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT))),
     "estimator": Column("estimator", answer_name),
     "score": _score("score", "score"),
     "interval": _interval("interval", "ci_low", "ci_high"),
@@ -83,7 +81,7 @@ OF_ROWS: dict[str, Column] = {
     "latency p50": _time("latency_p50", "latency_ms_p50", 1e3),
     "latency p95": _time("latency_p95", "latency_ms_p95", 1e3),
 }
-COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
+COLUMNS = ("place", "sensor", "estimator", "score", "notes", *list(OF_ROWS)[3:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
 WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "latency p95")
 """Columns that are printed only with all others."""

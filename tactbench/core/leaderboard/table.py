@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.events import events_table
-from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.leaderboard.names import (
     Bars,
     Row,
@@ -96,10 +95,10 @@ class Table:
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row a cell over its replicates, with the level of its sensor, what its order rests on, and stamps."""
+    """Return one row a cell over its replicates, with stamps of leaks and the nuisances its order depends on."""
     from tactbench.core.leaderboard.sensitivity import with_dependence  # numerics
 
-    return with_dependence(with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance)), store)
+    return with_dependence(with_leaks(over_replicates(rows)), store)
 
 
 def table_of(store: Store, rows: Sequence[Row]) -> Table:

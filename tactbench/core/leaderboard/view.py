@@ -21,7 +21,7 @@ _Texts = tuple[dict[str, str], str]
 """The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
-    "range", "training", "level", "published", "delay after touch",
+    "range", "training", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal leaves out first, in this order; those that are chosen by name are never left out."""
 
