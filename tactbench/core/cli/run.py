@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table, view_of
-from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
+from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut
@@ -48,8 +48,7 @@ _REASON_CHARACTERS = 200
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
                  show_default=True,
                  help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
-    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-                 help="Parallel worker processes. Default: one per usable core."),
+    JOBS,
     click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
                  help="Time limit per cell and per recording. Default: none."),
     click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",

@@ -15,38 +15,28 @@ from tactbench.core.spec.scene import Simulation
 
 
 def quick_estimator(registry: Registry, task: str) -> str:
-    """Return the name of an estimator for `task` that costs little: a linear one that searches no parameters.
+    """Return the name of a linear estimator for `task` that searches no parameters, the task's own before others.
 
-    The task's own come first, then those installed, then the task's own whatever they are.
+    Where there is none, the first of these estimators.
 
     Raises
     ------
     UsageError
-        If nothing that is no trivial answer is installed for this kind of question.
+        If no estimator for this kind of question is installed, trivial ones aside.
     """
     spec = registry.tasks[task].spec
-    fitting = [one for one in registry.estimators if spec.kind in one.kinds and not one.baseline]
-    own = [registry.estimators[name] for name in spec.estimators]
-    for one in (*own, *fitting):
-        if one.linear and not one.grid:
-            return one.name
-    if not (own or fitting):
+    fitting = [registry.estimators[name] for name in spec.estimators]
+    fitting += [one for one in registry.estimators if spec.kind in one.kinds and not one.baseline]
+    if not fitting:
         raise UsageError(f"No estimator for task {task!r} is installed.", hint="See `tactbench list estimators`.")
-    return (own or fitting)[0].name
+    return next((one.name for one in fitting if one.linear and not one.grid), fitting[0].name)
 
 
 def task_score(
-    registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, *, estimator: str, progress: Progress
+    registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, progress: Progress
 ) -> Row:
-    """Record every scene of `task` by `simulation` and return the row of its cell; no file is kept.
-
-    Everything is made anew, in processes of its own: no table of an earlier call makes a later one quicker.
-
-    Raises
-    ------
-    UsageError
-        If a name is unknown or the estimator cannot answer the task.
-    """
+    """Record every scene of `task` by `simulation` in a temporary folder and return the row of a quick estimator."""
+    estimator = quick_estimator(registry, task)
     choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
     matrix = MatrixSpec(
         rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
