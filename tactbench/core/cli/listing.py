@@ -40,7 +40,7 @@ def command(ctx: click.Context, family: str | None, shape: str) -> None:
     for name, entries in found.items():
         click.secho(name, bold=True)
         print_fields([(f"  {entry}", title) for entry, title in entries.items()])
-    tell_failed(registry)
+    remark_failed(registry)
 
 
 def _titles(registry: Registry, family: str) -> dict[str, str]:
@@ -73,8 +73,8 @@ def _plugins(registry: Registry, shape: str) -> None:
         click.secho(text, fg="red")
 
 
-def tell_failed(registry: Registry) -> None:
-    """Print to stderr which plugins could not be loaded; print nothing if all could."""
+def remark_failed(registry: Registry) -> None:
+    """Print on stderr which plugins could not be loaded, if any."""
     from tactbench.core.tables.terminal import remark
 
     if registry.failures or registry.refused:

@@ -1,9 +1,9 @@
-"""``tactbench why``: what a score rests on, whether it would be reused, how a cell ended, and the same once more."""
+"""``tactbench why``: what a score rests on, how a cell ended, whether it would be reused; its recomputation."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 Field = tuple[str, str]
 """A name, and a text of the value with its unit."""
 _TAIL = 15
-"""Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
+"""Lines of a traceback or log that are shown; JSON has all of them."""
 _FIELDS = 12
-"""Fields of one kind (recordings, reasons) that are shown; the others stand in ``--format json``."""
+"""Fields of one kind (recordings, reasons) that are shown; JSON has all of them."""
 
 
 @click.command(name="why")
@@ -34,10 +34,11 @@ _FIELDS = 12
 def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -> None:
     """Show what a cell's score rests on, whether its result would be reused, and how it ended.
 
-    CELL is a name as tables show it, or a part of it that only one cell has; of its replicates the first is meant. With
-    --again, the exit code is 1 if something differs or it fails. What a simulation recorded is then recorded again,
-    into another place.
+    CELL is a name as tables show it, or a part of it that only one cell has; the first of its replicates is meant. With
+    --again, simulated recordings are made anew in a temporary folder, and the exit code is 1 if a result differs or the
+    cell fails.
     """
+    from tactbench.core.cli.grid import print_fields
     from tactbench.core.matrix.why import stored_cell
     from tactbench.core.study.results import opened
 
@@ -46,14 +47,22 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
     if shape == "json":
         click.echo(json_text(facts, indent=1))
     else:
-        (_print_again if again else _print)(facts)
+        print_fields([(name, text) for name, text in (_again_fields if again else _fields)(facts) if text])
+        for part in ("traceback", "log"):
+            if lines := (facts.get(part) or "").splitlines():
+                click.echo(visible_lines("\n  ".join([f"{part}, last lines:", *lines[-_TAIL:]])))
+        if not again:
+            click.echo(visible_lines(f"\nTry: {facts['try']}"))
     ctx.exit(1 if again and facts["answer"] != "identical" else 0)
 
 
 def _facts(found: StoredCell) -> dict[str, Any]:
+    from tactbench.core.report.cells import recording_scores
+
     row, name = found.row, found.cell.name
     key, reasons = found.changes()
     done = row["status"] == "done"
+    scores = recording_scores(row, found.store.answers(str(row["key"])).get("test")) if done else []
     return {
         "cell": name,
         "answer": "hit" if done and not reasons else "miss",
@@ -66,7 +75,7 @@ def _facts(found: StoredCell) -> dict[str, Any]:
         "replicates": [*_replicates(found)] if done else [],
         "rests_on": [*_rests_on(row)] if done else [],
         "left_out": row["counts"],
-        "recording_scores": _recording_scores(found) if done else {},
+        "recording_scores": {one["recording"]: one["score"] for one in scores},
         "try": command_line("tactbench", "why", name, "--again", "--out", str(found.store.folder)),
     }
 
@@ -114,38 +123,24 @@ def _rests_on(row: Row) -> Iterator[Field]:
     yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
 
-def _recording_scores(found: StoredCell) -> dict[str, float]:
-    """Return the score of each test recording, of classes the accuracy; none of events."""
-    from tactbench.core.report.cells import recording_scores
-
-    scores = recording_scores(found.row, found.store.answers(str(found.row["key"])).get("test"))
-    return {name: value for name, _, value in map(dict.values, scores)}
-
-
-def _print(facts: Mapping[str, Any]) -> None:
-    from tactbench.core.cli.grid import print_fields
-
-    kept = "reuses it" if facts["answer"] == "hit" else "computes it again"
-    scores = [f"{value:.4g} of {name}" for name, value in facts["recording_scores"].items()]
+def _fields(facts: dict[str, Any]) -> Iterator[Field]:
+    """Yield the facts about a cell as fields of a screen."""
+    yield from (("cell", facts["cell"]), ("status", facts["status"]), ("reason", facts["reason"] or ""))
+    yield "signal", str(facts["signal"] or "")
+    yield "tactbench run", "reuses it" if facts["answer"] == "hit" else "computes it again"
+    yield from facts["replicates"]
+    if facts["rests_on"]:
+        yield "this replicate", facts["file"]
+        yield from ((f"  {name}", value) for name, value in facts["rests_on"])
     counts = sorted(facts["left_out"].items(), key=lambda one: -one[1])
     several = {
         "changed": facts["reasons"], "left out": [f"{count} {what}" for what, count in counts],
-        "test recordings": scores, "recordings": facts["recordings"],
+        "test recordings": [f"{value:.4g} of {name}" for name, value in facts["recording_scores"].items()],
+        "recordings": facts["recordings"],
     }  # fmt: skip
-    fields = [("cell", facts["cell"]), ("status", str(facts["status"])), ("reason", str(facts["reason"] or ""))]
-    fields += [("signal", str(facts["signal"] or "")), ("tactbench run", kept), *facts["replicates"]]
-    if facts["rests_on"]:
-        fields += [("this replicate", facts["file"]), *((f"  {name}", value) for name, value in facts["rests_on"])]
     for name, texts in several.items():
         more = [f"… {len(texts) - _FIELDS} more"] if len(texts) > _FIELDS else []
-        labels = [f"{name} ({len(texts)})", *[""] * _FIELDS]
-        fields += zip(labels, [*texts[:_FIELDS], *more], strict=False)
-    print_fields([(name, value) for name, value in fields if value])
-    for part in ("traceback", "log"):
-        lines = (facts[part] or "").splitlines()
-        if lines:
-            click.echo(visible_lines("\n  ".join([f"{part}, last lines:", *lines[-_TAIL:]])))
-    click.echo(visible_lines(f"\nTry: {facts['try']}"))
+        yield from zip([f"{name} ({len(texts)})", *[""] * _FIELDS], [*texts[:_FIELDS], *more], strict=False)
 
 
 def _again(found: StoredCell) -> dict[str, Any]:
@@ -164,13 +159,8 @@ def _again(found: StoredCell) -> dict[str, Any]:
     }
 
 
-def _print_again(facts: Mapping[str, Any]) -> None:
-    from tactbench.core.cli.grid import print_fields
-
-    fields = [("cell", facts["cell"]), ("answers, scores, intervals", facts["answer"]), ("status", facts["status"])]
-    fields += [("reason", facts["reason"]), ("recordings made", str(facts["recordings_made"]))]
-    fields += [("differs", text) for text in facts["differences"]]
-    fields += [("changed since", text) for text in facts["circumstances"]]
-    print_fields([(name, value) for name, value in fields if value])
-    if facts["traceback"]:
-        click.echo(visible_lines(facts["traceback"]))
+def _again_fields(facts: dict[str, Any]) -> Iterator[Field]:
+    yield from (("cell", facts["cell"]), ("answers, scores, intervals", facts["answer"]), ("status", facts["status"]))
+    yield from (("reason", facts["reason"]), ("recordings made", str(facts["recordings_made"])))
+    yield from (("differs", text) for text in facts["differences"])
+    yield from (("changed since", text) for text in facts["circumstances"])

@@ -32,9 +32,7 @@ def quick_estimator(registry: Registry, task: str) -> str:
     return next((one.name for one in fitting if one.linear and not one.grid), fitting[0].name)
 
 
-def task_score(
-    registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, progress: Progress
-) -> Row:
+def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, progress: Progress) -> Row:
     """Record every scene of `task` by `simulation` in a temporary folder and return the row of a quick estimator."""
     estimator = quick_estimator(registry, task)
     choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))

@@ -51,6 +51,7 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
         If there is no such column.
     """
     known = {name: name for name in (*COLUMNS, CELL)} | {shown: name for name, shown in SHOWN.items()}
+    names = [name.strip() for name in names]
     for name in names:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -22,21 +22,21 @@ _GROUPS = {
     **dict.fromkeys(RestsOn.model_fields, "What it rests on"),
 }
 """Titles of groups of values, by key."""
-_TEXTS = ("traceback", "log")
 
 
 def details(row: Row, results: Results) -> Details:
     """Return the values of a cell's row that are not empty, by their keys, and the scores of its recordings."""
     known = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    texts = {name: str(known.pop(name)) for name in _TEXTS if name in known}
+    texts = {name: str(known.pop(name)) for name in ("traceback", "log") if name in known}
     tested = results.answers(row).get("test") if row["status"] == "done" else None
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
-    records: dict[str, Sequence[Mapping[str, Any]]] = {f"Score of each recording{of}": recording_scores(row, tested)}
     classes = list(map(str, row.get("classes") or ()))
-    counts = zip(classes, known.pop("confusion", ()), strict=False)
-    records["Confusion: true class down, answer across [rows]"] = [
-        {"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts
-    ]
+    confusion = [dict(zip(["true", *classes], [one, *counts], strict=False))
+                 for one, counts in zip(classes, known.pop("confusion", ()), strict=False)]  # fmt: skip
+    records: dict[str, Any] = {
+        f"Score of each recording{of}": recording_scores(row, tested),
+        "Confusion: true class down, answer across [rows]": confusion,
+    }
     pairs: dict[str, dict[str, str]] = {}
     for name in sorted(known, key=[*_GROUPS, *known].index):
         value = known[name]
@@ -49,10 +49,9 @@ def details(row: Row, results: Results) -> Details:
 
 
 def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
-    """Return name, number of rows and score of each test recording that a cell was answered from.
+    """Return name, number of rows, metric and score of each test recording of a cell; of events none.
 
-    Of classes the share of right answers, since a recording may hold one class alone; of events nothing, since a
-    recording may hold none.
+    The metric of classes is the accuracy, since a recording may hold one class.
     """
     metric = METRICS.get(str(row["metric"]).removeprefix(TRUE))
     if tested is None or metric is None or metric.kind == "events":
@@ -63,9 +62,8 @@ def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
     for number in np.unique(tested.recording):
         own = tested.recording == number
         value = metric.of(tested.y_true[own], tested.y_pred[own], len(row["classes"] or ()))
-        name = METRIC_NAMES.get(metric.name, metric.name)
-        recording = PurePosixPath(row["recordings"][number]).stem
-        found.append({"recording": recording, "test rows": int(own.sum()), name: value})
+        found.append({"recording": PurePosixPath(row["recordings"][number]).stem, "test rows": int(own.sum()),
+                      "metric": METRIC_NAMES.get(metric.name, metric.name), "score": value})  # fmt: skip
     return found
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tactbench.core.cli.grid import print_records
-from tactbench.core.cli.run import tell_stopped
+from tactbench.core.cli.run import remark_stopped
 from tactbench.core.errors import RigError
 from tactbench.core.study.operator import TerminalOperator
 from tactbench.core.study.progress import progress
@@ -73,7 +73,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
         {"cell": "a/b/c", "status": "failed", "reason": "RuntimeError: two\nlines\x1b[2J"},
         {"cell": "a/b/d e", "status": "timeout", "reason": "x" * 1000},
     ]
-    tell_stopped(rows, tmp_path)
+    remark_stopped(rows, tmp_path)
     said = capsys.readouterr()
     assert said.out == ""
     assert "a/b/c: RuntimeError: two lines\\x1b[2J\n" in said.err, "a reason moves no cursor"

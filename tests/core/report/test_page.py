@@ -113,7 +113,7 @@ def test_scores_of_folds_and_recordings(material):
     assert "Score of each recording" in text
     curvature = next(one for one in material.rows if one["task"] == "curvature" and one["estimator"] == "forest")
     found = recording_scores(curvature, material.answers(curvature)["test"])
-    right = sum(one["test rows"] * one["accuracy"] for one in found) / curvature["n_test"]
+    right = sum(one["test rows"] * one["score"] for one in found) / curvature["n_test"]
     assert (len(found), right) == (5, pytest.approx(curvature["scores"]["accuracy"], rel=1e-12))
 
 
