@@ -57,8 +57,8 @@ _HIDDEN = ("name", "scenes", "campaigns", "published", "protocols", "dimensions"
 def _page(owned: Owned[Any]) -> None:
     """Print the fields of a descriptor, and its scenes or parameters as tables."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
-    from tactbench.core.leaderboard.names import lower_is_better
     from tactbench.core.spec.rig import TaskDescriptor
+    from tactbench.core.spec.row import lower_is_better
     from tactbench.core.tables.text_table import text_table
 
     one = owned.descriptor

@@ -27,7 +27,7 @@ _GROUPS = {
 def details(row: Row, results: Results) -> Details:
     """Return the values of a cell's row that are not empty, by their keys, and the scores of its recordings."""
     known = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    texts = {name: str(known.pop(name)) for name in ("traceback", "log") if name in known}
+    texts: dict[str, str] = {name: str(known.pop(name)) for name in ("traceback", "log") if name in known}
     tested = results.answers(row).get("test") if row["status"] == "done" else None
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
     classes = list(map(str, row.get("classes") or ()))

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.requirements import Requirements, held_against
+from tactbench.core.leaderboard.requirements import Requirements, with_requirements
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.spec.task import PlannedScene
 from tactbench.plugin import ChannelSpec, DataSheet, PhysicalRange, Scene, SensorSpec, Source, StreamSpec
@@ -30,7 +30,7 @@ def answer(name="a", score=0.5, delay=1.0, **more):
 
 
 def only(rows, required, *sensors):
-    (block,) = held_against(
+    (block,) = with_requirements(
         build_table(rows), required, PRESSED, {one.name: one for one in sensors or (sensor(),)}
     ).blocks
     return block

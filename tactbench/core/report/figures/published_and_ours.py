@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.names import answer_name, lower_is_better, metric_name
+from tactbench.core.leaderboard.names import answer_name, direction, metric_name
 from tactbench.core.report.figures.group import MARKS, Sketch
 from tactbench.core.report.figures.style import BLACK, GREY, legend, panels, sensor_colours
 from tactbench.core.report.published import Reproduction, reproduce
@@ -68,6 +68,5 @@ def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mappi
     here.set_ylim(len(lines) - 0.4, -0.6)
     here.grid(axis="x", linewidth=0.4, color=GREY, alpha=0.3)
     row = lines[0][1]
-    better = "lower" if lower_is_better(row["metric"]) else "higher"
-    here.set_xlabel(f"{metric_name(row)}, {better} is better")
+    here.set_xlabel(f"{metric_name(row)}, {direction(row)}")
     here.set_title(f"{row['task']} · {row['protocol']}{' †' if row['dagger'] else ''}")
