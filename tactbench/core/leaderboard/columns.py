@@ -10,7 +10,7 @@ from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
-from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, whole
+from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, whole
 from tactbench.core.tables.text import visible
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
@@ -48,15 +48,14 @@ def _seconds(row: Row, key: str) -> float | None:
 
 
 def _range(row: Row) -> str:
-    """Return the lowest and highest score of campaigns; without an interval, the scores of the units held out."""
+    """Return the scores of campaigns, or of the units held out, if they are too few for an interval."""
     scores, unit = row.get("replicate_scores") or [], row["unit"]
-    if len(scores) < 2 or (held_out(row) and row["ci_low"] is not None):
+    if len(scores) < 2 or row["ci_low"] is not None:
         return ABSENT
-    several = f"{coarse(row['score_min'], unit)} … {coarse(row['score_max'], unit)}"
-    if not held_out(row):
-        return several
     each = ", ".join(score(one, unit) for one in scores)
-    return visible(f"{each if len(scores) < FEWEST else several} by {row['replicate_unit']}")
+    several = f"{score(row['score_min'], unit)} … {score(row['score_max'], unit)}"
+    shown = each if len(scores) < FEWEST else several
+    return visible(f"{shown} by {row['replicate_unit']}" if held_out(row) else shown)
 
 
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}

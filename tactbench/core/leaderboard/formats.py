@@ -17,7 +17,6 @@ from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
-from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
 from tactbench.core.tables.csv_text import csv_text
@@ -58,13 +57,11 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
-    """Return a block as LaTeX; it has no commands, and no places unless they are among `names`."""
-    # Cells without a score stand above the rule: trivial answers alone are below it.
+    """Return a block as LaTeX with the columns `names`, trivial answers below a rule."""
     order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
     lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
-    left_out = {"notes"} | ({"range"} if names == _IN_A_PAPER and "interval" in grid.columns else set())
-    names = [name for name in names if name in grid.columns and name not in left_out]
+    names = [name for name in names if name in grid.columns and name != "notes"]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
     heads = {
         name: head.replace(" over ", "\nover ") if " over " in head else "\n".join(head.rsplit(" ", 1))
@@ -92,22 +89,12 @@ def _column(name: str, texts: Sequence[str]) -> str:
 
 
 def _caption(block: Block) -> str:
-    """Return the title of a block, its setting, where it comes from, and how many samples and what intervals are of."""
+    """Return the title of a block, its setting, its origin, and the number of test samples."""
     rows = [line.row for line in block.lines if line.kind == "result"]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
-    over = {
-        (int(row["n_replicates"]), visible(str(row["replicate_unit"])))
-        for row in rows
-        if row["ci_low"] is not None and row.get("n_replicates")
-    }
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
-    if len(over) == 1:
-        number, unit = over.pop()
-        campaigns = unit == "replicate"  # a campaign has a score of its own
-        what = "Scores are medians, intervals" if campaigns else "Intervals are"
-        sentences.append(f"{what} over {counted(number, 'campaign' if campaigns else unit)}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)

@@ -19,7 +19,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n", "verdict",
+    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "n", "verdict",
 )  # fmt: skip
 _NAMES: dict[Kind, Callable[[Row], str]] = {
     "sensors": lambda row: str(row["sensor"]),
@@ -187,8 +187,6 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         _probability(found.p),
         _probability(pair.folds.p) if pair.folds else ABSENT,
         "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
-        ABSENT if found.effect is None else signed(found.effect, "1"),
-        ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
         verdict,
     )
@@ -207,8 +205,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     notes = [
         "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
         "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all comparisons "
-        "that the matrix declares, others are exploratory. Effect: the difference over the standard deviation of the "
-        "replicates' differences. n counts replicates."
+        "that the matrix declares, others are exploratory. n counts replicates."
     ]
     for pair, apart in found:
         region, unit = pair.row.get("equivalence"), suffix(pair.row["unit"])

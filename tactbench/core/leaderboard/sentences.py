@@ -259,7 +259,7 @@ def _compared(board: Board) -> Iterator[Note]:
 
 
 def _how(board: Board) -> Iterator[Note]:
-    """Yield definitions of score, interval and range."""
+    """Yield definitions of score and interval."""
     sentences = []
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
@@ -267,7 +267,7 @@ def _how(board: Board) -> Iterator[Note]:
         covered = [least_coverage(row["n_replicates"]) for row in campaigns if row["ci_low"] is not None]
         least = f"; interval: of that median, coverage at least {100 * min(covered):.3g} %" if covered else ""
         median = f"median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
-        several = f"Score: {median}{least}; range: lowest … highest campaign"
+        several = f"Score: {median}{least}"
         sentences.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
     if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
         sentences.append("Open: so few put no upper bound to the error")

@@ -19,7 +19,7 @@ CELL, REASON = "cell", "reason"
 """Columns of the names of cells, and of the reasons why they did not finish."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
-    "range", "training", "published", "delay after touch",
+    "training", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal leaves out first, in this order; those that are chosen by name are never left out."""
 
@@ -75,9 +75,6 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     texts = list(map(_texts, shown))
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in texts[0])
-    first_to_go: tuple[str, ...] = _FIRST_TO_GO
-    if not any(one.get("interval") for one in texts):  # the range stands in its place
-        first_to_go = tuple(name for name in first_to_go if name != "range")
     table = TextTable(
         block.title,
         names,
@@ -88,7 +85,7 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         origin=block.origin,
         summary=(block.setting, *block.verdict),
         notes=tuple(note.text for note in block.notes),
-        first_to_go=() if view.columns else first_to_go,
+        first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )
     # A column of dashes shows that no answer has a place.
@@ -112,10 +109,11 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
     interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
-    units = [row for row in rows if row["ci_low"] is not None and held_out(row)]
-    if units:
-        counts = [row["n_replicates"] for row in units]
-        interval += f" over {visible(count_range(counts, str(units[0]['replicate_unit'])))}"
+    results = [line.row for line in block.lines if line.kind == "result"]
+    known = [row for row in results if row["ci_low"] is not None and row.get("n_replicates")]
+    if known:
+        of = str(known[0]["replicate_unit"]) if held_out(known[0]) else "campaign"
+        interval += f" over {visible(count_range([row['n_replicates'] for row in known], of))}"
     shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
     shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(rows[0]))}
     return tuple(shown.get(name, name) for name in names)

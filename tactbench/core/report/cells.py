@@ -10,7 +10,7 @@ import numpy as np
 
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.leaderboard.names import METRIC_NAMES, Row
-from tactbench.core.report.results import Details, Results
+from tactbench.core.report.results import Details
 from tactbench.core.samples import Answers
 from tactbench.core.spec.row import TRUE, Asked, Cost, Ended, RestsOn, Scored
 from tactbench.core.tables.text_table import field_text, records_table
@@ -24,11 +24,10 @@ _GROUPS = {
 """Titles of groups of values, by key."""
 
 
-def details(row: Row, results: Results) -> Details:
+def details(row: Row, tested: Answers | None) -> Details:
     """Return the values of a cell's row that are not empty, by their keys, and the scores of its recordings."""
-    known = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
+    known = {name: value for name, value in row.items() if name != "digests" and value not in (None, "", [], {}, ())}
     texts: dict[str, str] = {name: str(known.pop(name)) for name in ("traceback", "log") if name in known}
-    tested = results.answers(row).get("test") if row["status"] == "done" else None
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
     classes = list(map(str, row.get("classes") or ()))
     confusion = [dict(zip(["true", *classes], [one, *counts], strict=False))
@@ -43,7 +42,7 @@ def details(row: Row, results: Results) -> Details:
         if isinstance(value, list | tuple) and isinstance(value[0], Mapping):
             records[name] = value
         else:
-            pairs.setdefault(_GROUPS.get(name, "Also"), {})[name] = _text(value)
+            pairs.setdefault(_GROUPS.get(name, "Replicates"), {})[name] = _text(value)
     tables = tuple(records_table(title, own) for title, own in records.items() if own)
     return Details(cell=str(row["cell"]), status=str(row["status"]), pairs=pairs, tables=tables, texts=texts)
 
@@ -70,6 +69,6 @@ def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
 def _text(value: Any) -> str:
     """Return the text of a value, with one line for each entry of a mapping and for each text of a list."""
     if isinstance(value, Mapping):
-        return "\n".join(f"{name}: {field_text(one)}" for name, one in value.items())
+        return "\n".join(f"{name}: {text}" for name, one in value.items() if (text := field_text(one)))
     lines = isinstance(value, list | tuple) and any(isinstance(one, str) for one in value)
     return "\n".join(map(field_text, value)) if lines else field_text(value)

@@ -114,7 +114,8 @@ def cells_section(results: Results) -> Section:
         return Section(paragraphs=(f"These are more than {MOST_CELLS} cells: `tactbench why CELL` has their details.",))
     several = any(row["repeats"] > 1 for row in results.rows)
     paragraphs = ("Of several replicates, key, recordings, candidates and effects are those of the first.",) * several
-    found = tuple(details(line.row, results) for line in results.leaderboard.lines)
+    rows = [line.row for line in results.leaderboard.lines]
+    found = tuple(details(row, results.answers(row).get("test")) for row in rows)
     return Section(paragraphs=paragraphs, details=found)
 
 
