@@ -141,10 +141,7 @@ def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, 
     assert not any("sampled at" in one for one in remarks)
 
 
-WRONG = ("@", "@k", "@k=-1", "@every=0", "@,k=1", "@k=1,every=2", "@tare=1", "@k=1@k=2")
-
-
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", ["@", "@k", "@k=-1", "@every=0", "@,k=1", "@k=1,every=2", "@tare=1", "@k=1@k=2"])
 def test_what_is_no_option_of_a_protocol_is_refused(name):
     with pytest.raises(UsageError, match="no option"):
         protocol_called(f"deployable{name}")

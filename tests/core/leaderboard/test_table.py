@@ -61,30 +61,29 @@ def test_a_cell_that_was_not_begun_stands_with_those_of_its_rig_where_these_agre
 def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
     rows = [row(split="shuffled"), row(protocol="first-frame"), row(split="trial"), row(task="another", split="z")]
     random.Random(1).shuffle(rows)
-    blocks = build_table(rows, questions={"another": "Which one?"}).blocks
-    assert [block.title for block in blocks] == ["Another: which one?", *["Question"] * 3]
-    assert ["trial" in blocks[1].setting, "first-frame" in blocks[2].setting, "shuffled" in blocks[3].setting] == [
-        True
-    ] * 3
+    blocks = build_table(rows, questions={"another": "Which?"}).blocks
+    assert [block.title for block in blocks] == ["Another: which?", *["Question"] * 3]
+    for block, name in zip(blocks[1:], ("trial", "first-frame", "shuffled"), strict=True):
+        assert name in block.setting
 
 
 def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row()]))
-    assert grid.headers == ("place", "sensor", "estimator", "RMSE [N]", "95 % interval", "training")
+    assert grid.columns == ("place", "sensor", "estimator", "score", "interval", "training")
     (grid,) = grids(build_table([row(**FLOOR)]), View(wide=True))
-    assert {"beyond floor [N]", "test samples", "latency p50", "cell"} <= set(grid.headers)
+    assert {"beyond floor", "test samples", "latency p50", "cell"} <= set(grid.columns)
     (grid,) = grids(build_table([row(cell="a/b")]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
     assert grid.lines == (("a/b", "0.5000", "1"),)
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known names: .*cell"):
+    with pytest.raises(UnknownNameError, match=r"'score'.*cell"):
         known_columns(["scor"])
 
 
 def test_a_trivial_answer_that_was_skipped_stands_in_the_note_alone_unless_all_columns_are_asked_for():
-    ended = {"status": "skipped", "score": None, "reason": "No clock."}
+    ended = {"status": "skipped", "score": None, "reason": "Why."}
     rows = [row(), row(estimator="time-index", is_baseline=True, **ended), row("b", **ended)]
     table = build_table(rows)
     assert [[line[1] for line in grid.lines] for grid in grids(table)] == [["a", "b"]]
-    assert "a/time-index, b/lasso skipped: No clock." in table.notes
+    assert any("a/time-index, b/lasso" in note and "Why." in note for note in table.notes)
     assert len(grids(table, View(wide=True))[0].lines) == 3
     assert len(grids(build_table(rows[1:2]))[0].lines) == 1
 
@@ -95,4 +94,3 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     )]  # fmt: skip
     (block,) = best(build_table(rows), 1).blocks
     assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == [("1", "a"), ("3", "b")]
-    assert "places among all" in block.setting
