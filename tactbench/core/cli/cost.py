@@ -62,8 +62,7 @@ def _show_knobs(
 ) -> None:  # fmt: skip
     """Measure the settings of an estimator, or of the simulation; print and write the results."""
     from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cost.knobs import measure, settings_of, simulations_of
-    from tactbench.core.cost.task_score import quick_estimator
+    from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.run import EngineChoice
     from tactbench.core.plugins.declared import declared_in, with_declared

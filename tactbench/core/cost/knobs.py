@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tactbench.core.cost.precision import front
+from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, shots
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import Registry
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor
@@ -60,6 +62,24 @@ class Setting(NamedTuple):
         way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
         wanted = (way, self.estimator.name, dict(self.estimator.params))
         return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
+
+
+def quick_estimator(registry: Registry, task: str) -> str:
+    """Return the name of a linear estimator for `task` that searches no parameters, the task's own before others.
+
+    Where there is none, the first of these estimators.
+
+    Raises
+    ------
+    UsageError
+        If no estimator for this kind of question is installed, trivial ones aside.
+    """
+    spec = registry.tasks[task].spec
+    fitting = [registry.estimators[name] for name in spec.estimators]
+    fitting += [one for one in registry.estimators if spec.kind in one.kinds and not one.baseline]
+    if not fitting:
+        raise UsageError(f"No estimator for task {task!r} is installed.", hint="See `tactbench list estimators`.")
+    return next((one.name for one in fitting if one.linear and not one.grid), fitting[0].name)
 
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:

@@ -5,7 +5,7 @@ docs/tables.md has the list. At most two sentences stand above and five notes be
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
@@ -40,21 +40,21 @@ class Note(NamedTuple):
 class Board:
     """The rows of a block."""
 
-    placed: Sequence[tuple[Row, Rank]]
-    """Answers better than the trivial one of their sensor, in order."""
+    placed: Sequence[Row]
+    """Answers better than the trivial one of their sensor, the best first."""
+    ranks: Mapping[str, Rank]
+    """Their ranks by the names of their cells; empty if there are too few campaigns or held-out units."""
     unplaced: Sequence[Row]
     """Answers that are no better than the trivial one of their sensor."""
     trivial: Sequence[Row]
     stopped: Sequence[Row]
     """Cells without a score."""
-    unranked: str
-    """Reason why places rest on no intervals; empty if they do."""
     bars: Bars
 
     @property
     def answers(self) -> list[Row]:
         """Return the answers, those with a place first."""
-        return [*(row for row, _ in self.placed), *self.unplaced]
+        return [*self.placed, *self.unplaced]
 
     @property
     def finished(self) -> list[Row]:
@@ -64,7 +64,7 @@ class Board:
     @property
     def by_floor(self) -> bool:
         """Return whether places go by errors beyond the floor."""
-        return beyond_floor([row for row, _ in self.placed])
+        return beyond_floor(self.placed)
 
     def name(self, row: Row) -> str:
         """Return the name of a row in a sentence: its estimator, with the sensor where there are several."""
@@ -106,14 +106,12 @@ def _outcome(board: Board) -> str:
         of = "The only answer" if count == 1 else f"None of {count} answers"
         scores = "scores no better" if count == 1 else "scores better"
         return f"{of} {scores} than the trivial one of its own sensor ({bars})." if count else ""
-    (first, leader), *others = board.placed
+    first, *others = board.placed
     name = board.name(first)
     where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
     quality = "the smallest error beyond the floor" if board.by_floor else "the best score"
-    if board.unranked == "few":
-        return f"{_too_few([row for row, _ in board.placed])}; {name} has {quality}."
-    if board.unranked or leader.low is None:
-        return f"Places are by score alone: {board.unranked or 'an answer has no interval'}."
+    if not board.ranks:
+        return f"{_too_few(board.placed)}; {name} has {quality}."
     if board.bars.unshown(first):
         return (
             f"{where}{name} has {quality}, and is not shown to be better than the trivial "
@@ -125,10 +123,11 @@ def _outcome(board: Board) -> str:
         only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
         return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
     # Answers of the same place differ from it in single pairs at most, and of many pairs some differ by chance.
-    alike = [row for row, rank in others if rank.place == leader.place or not rank.behind]
+    place = board.ranks[first["cell"]].place
+    alike = [row for row in others if (rank := board.ranks[row["cell"]]).place == place or not rank.behind]
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be distinguished from it."
-    return f"{where}{name} is best; {_closest(board, first, [row for row, _ in others])}."
+    return f"{where}{name} is best; {_closest(board, first, others)}."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
@@ -204,12 +203,12 @@ def _marks(board: Board) -> Iterator[Note]:
             for text, of in texts.items()
         )
         yield Note(f"{mark}  {lead}{texts_of}{'' if texts_of.endswith('?') else '.'}", printed=True)
-    if any(rank.unsure for _, rank in board.placed) and not board.unranked:
+    if any(rank.unsure for rank in board.ranks.values()):
         yield Note(f"{SHARED}  each of these rows cannot be distinguished from at least one other")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
-    unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
+    unshown = [row for row in board.placed if UNSHOWN in board.marks(row)]
     if unshown:
         yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
 
@@ -243,8 +242,8 @@ def _floors(board: Board) -> Iterator[Note]:
 
 def _compared(board: Board) -> Iterator[Note]:
     """Yield how rows of several sensors are compared on recordings, and what that comparison cannot show."""
-    rows = [row for row, _ in board.placed if held_out(row)]
-    if board.unranked or len({row["sensor"] for row in rows}) < 2:
+    rows = [row for row in board.placed if held_out(row)]
+    if not board.ranks or len({row["sensor"] for row in rows}) < 2:
         return
     unit = plural(str(rows[0]["replicate_unit"]))
     shared = len({tuple(row["replicates"]["names"]) for row in rows}) == 1

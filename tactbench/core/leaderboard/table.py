@@ -137,18 +137,20 @@ def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
     finished = [row for row in members if row["status"] == "done"]
     answers = [row for row in finished if not row["is_baseline"]]
     entered = [row for row in answers if not bars.no_better(row)]
-    # Equal ones stay in the order of the names.
-    ordered = sorted(zip(errors(entered), entered, strict=True), key=lambda one: (one[0], error_of(one[1])))
-    found, unranked = places([row for _, row in ordered])
-    # Of equal place stays the better one first.
-    placed = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
+    order = dict(zip((row["cell"] for row in entered), errors(entered), strict=True))
+    entered.sort(key=lambda row: (order[row["cell"]], error_of(row)))  # equal ones in the order of their names
+    ranks: dict[str, Rank] = {}
+    if entered and all(map(_may_be_placed, entered)):
+        from tactbench.core.statistics.ranking import ranks as ranks_of  # numerics
+
+        ranks = ranks_of(entered)
+        entered.sort(key=lambda row: ranks[row["cell"]].place)
     unplaced = sorted((row for row in answers if bars.no_better(row)), key=error_of)
     trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
     stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
-    board = Board(placed, unplaced, trivial, stopped, unranked, bars)
+    board = Board(entered, ranks, unplaced, trivial, stopped, bars)
     texts = {str(row["cell"]): NO_BETTER for row in unplaced}
     texts |= {str(row["cell"]): "oracle" for row in trivial if row.get("looks_at") == "reference"}
-    ranks = {} if unranked == "few" else found
     setting = [f"{metric_name(members[0])}, {direction(members[0])}", f"protocol {protocol}"]
     setting += [split_name(split)] if split else []
     classes = [len(row["classes"]) for row in finished if row["classes"]]
@@ -200,25 +202,10 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     return groups
 
 
-def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
-    """Return the rank of each of `results` by the name of its cell, and the reason if ranks rest on no intervals.
-
-    `results` are the finished answers of one block, the best score first.
-    """
-    if any(row.get("replicates") for row in results) and all(map(_may_be_placed, results)):
-        from tactbench.core.statistics.ranking import ranks  # numerics
-
-        return ranks(results), ""
-    ordered = errors(results)
-    by_score = [Rank(1 + ordered.index(error), None, None, ordered.count(error) > 1) for error in ordered]
-    why = "few" if not all(map(_may_be_placed, results)) else "these rows keep no replicates" if results else ""
-    return dict(zip((row["cell"] for row in results), by_score, strict=True)), why
-
-
 def _may_be_placed(row: Row) -> bool:
-    """Return whether a row has enough campaigns or held-out units for a place, or states no number of them."""
-    count = row.get("n_replicates")
-    return count is None or (count >= FEWEST if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None)
+    """Return whether a row has enough campaigns or held-out units for a place."""
+    enough = (row.get("n_replicates") or 0) >= FEWEST
+    return enough if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None
 
 
 def errors(results: Sequence[Row]) -> list[float]:

@@ -115,14 +115,14 @@ def test_one_name_means_one_task(pad):
 
 
 WRONG = {
-    "[x, z]": "names: [x, y]",
-    "[]": "[session, recording]",
+    "names: [x, z]": "names: [x, y]",
+    " []": " [session, recording]",
     "source: label, name: colour": "source: vector, kind: position, names: [x, y], unit: mm",
 }
 """What stands in the mapping in place of what."""
 
 
-@pytest.mark.parametrize(("new", "says"), [("[x, z]", "x, y"), ("[]", "pad.yaml:"), ([*WRONG][-1], "colour")])
+@pytest.mark.parametrize(("new", "says"), [*zip(WRONG, ("x, y", "pad.yaml:", "colour"), strict=True)])
 def test_what_a_mapping_declares_wrongly_is_refused(pad, new, says):
     assert WRONG[new] in PAD
     (pad.folder / "pad.yaml").write_text(PAD.replace(WRONG[new], new))

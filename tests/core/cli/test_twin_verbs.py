@@ -16,14 +16,12 @@ def verbs(tmp_path):
 
 def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
     rows = {row["effect"]: row for row in json.loads(verbs(*EXPLAIN, "--effects=-force-noise").stdout)}
+    assert (rows["force-noise"]["included"], rows["force-noise"]["asked"]) == (False, True)
     assert rows["contact"]["included"]
     assert rows["contact"]["cost_ms"] > 0
     assert (rows["core"]["included"], rows["core"]["change"]) == (False, 0)
     assert all(row["reason"] for row in rows.values())
     assert rows["creep"]["scenes"] == 3
-    # The 0.69 N of the noise that was left out are most of the error.
-    assert rows["contact"]["score"] < 0.3 < 0.6 < rows["contact"]["score_all_effects"]
-    assert min(rows["contact"]["sim_s"], rows["contact"]["sim_s_all_effects"]) > 0
 
 
 def test_effects_rungs_and_scenarios_are_kept_with_the_recording(verbs):
