@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import WORSE_END, Bars, Row, answer_name, grouped, sensor_name, sign_of
+from tactbench.core.leaderboard.names import WORSE_END, Row, answer_name, grouped, sensor_name, sign_of
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit
 from tactbench.core.tables.text import visible
@@ -26,24 +26,28 @@ COLUMNS = (
 _NOTE = (
     f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer), or the "
     "row is stamped (‡); PART: less, but more than a guess. OPTIMISTIC: shuffled rows score beyond the interval of the "
-    "split. TRIVIAL: an answer that reads no sensor scores as well, or the interval does not exclude it (TRIVIAL?). "
-    "See docs/real-recordings.md."
+    "split. See docs/real-recordings.md."
 )
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Return a table of finished answers under `deployable` beside their probes; None if nothing was probed."""
-    bars = Bars(rows)
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
     for row, first, shuffled in _probed(rows):
         if first is not None or shuffled is not None:
-            lines.append(_line(row, shuffled, first, bars))
+            interval_of = interval(row["ci_low"], row["ci_high"], row["unit"])
+            lines.append((
+                sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
+                _shown(row), Entry(interval_of, row["ci_low"], cell=row["cell"]), _shown(shuffled), _shown(first),
+                Entry(score(row["baseline"], row["unit"]), row["baseline"]),
+                ", ".join(_verdicts(row, shuffled, first)) or "no leak shown",
+            ))  # fmt: skip
         if first is not None and first["status"] == "skipped":
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
         return None
-    kinds = tuple("alarm" if {"LEAK", "TRIVIAL"} & set(line[-1].split(", ")) else "plain" for line in lines)
+    kinds = tuple("alarm" if "LEAK" in line[-1] else "plain" for line in lines)
     title = "Probe · does the score come from the contact?"
     return TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[4:9]), notes=(_NOTE, *skipped), kinds=kinds)
 
@@ -79,16 +83,6 @@ def _probe_of(alike: Sequence[Row], protocol: str, split: str) -> Row | None:
     return next((one for one in alike if one["protocol"] == protocol and one["split"] in (split, None)), None)
 
 
-def _line(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> tuple[str, ...]:
-    bar = score(bars.score(row), row["unit"]) + (f" {bars.name(row)}" if bars.trivial(row) else "")
-    return (
-        sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
-        _shown(row), Entry(interval(row["ci_low"], row["ci_high"], row["unit"]), row["ci_low"], cell=row["cell"]),
-        _shown(shuffled), _shown(first), Entry(bar, bars.score(row), cell=row["cell"]),
-        ", ".join(_verdicts(row, shuffled, first, bars)) or "no leak shown",
-    )  # fmt: skip
-
-
 def _shown(row: Row | None) -> str:
     if row is None:
         return ABSENT
@@ -96,14 +90,12 @@ def _shown(row: Row | None) -> str:
     return Entry(text, row["score"], cell=row["cell"])
 
 
-def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> Iterator[str]:
-    sign = sign_of(row)
-    if bars.trivial(row) is not None and (bars.no_better(row) or bars.unshown(row)):
-        yield "TRIVIAL" if bars.no_better(row) else "TRIVIAL?"
+def _verdicts(row: Row, shuffled: Row | None, first: Row | None) -> Iterator[str]:
     leaks = any(str(stamp).startswith(LEAKS) for stamp in row["stamps"])
     if verdict := "LEAK" if leaks else _of_first_frame(row, first):
         yield verdict
     if shuffled is not None and shuffled["status"] == "done":
+        sign = sign_of(row)
         best = row[WORSE_END[-sign]]
         if best is None:
             yield "no interval for shuffled rows"

@@ -25,9 +25,6 @@ def erring(score, protocol="deployable", split="session", **more):
     return row(score=score, metric="rmse", unit="N", baseline=10.0, protocol=protocol, split=split, **more)
 
 
-NONE = "no leak shown"
-
-
 def verdict(*rows):
     table = build_probe(rows)
     (line,) = table.lines
@@ -71,22 +68,3 @@ def test_a_probe_that_makes_no_sense_says_why():
     table = build_probe([classed(0.9), skipped])
     assert "skipped" in table.lines[0]
     assert table.notes[-1] == "a/question: One."
-
-
-@pytest.mark.parametrize(
-    ("scores", "says"),
-    [
-        ({"mean": 10.0, "time-index": 0.9}, "TRIVIAL"),
-        ({"time-index": 1.1, "mean": 10.0}, "TRIVIAL?"),
-        ({"mean": 10.0, "time-index": 3.0}, ""),
-    ],
-)
-def test_the_best_of_all_trivial_answers_is_looked_at(scores, says):
-    trivial = [erring(value, estimator=name, is_baseline=True) for name, value in scores.items()]
-    elsewhere = erring(0.1, estimator="mean", is_baseline=True, split="press")
-    table = build_probe([erring(1.0), erring(1.2, split="shuffled"), *trivial, elsewhere])
-    (line,) = table.lines
-    assert line[-1].replace(NONE, "") == says
-    assert table.kinds == ("alarm" if says == "TRIVIAL" else "plain",)
-    best = min(scores, key=scores.get)
-    assert line[table.columns.index("trivial")] == f"{scores[best]:.4f} {best}"
