@@ -49,7 +49,8 @@ def page(tmp_path_factory) -> Path:
     material = open_results(Store(folder), load_registry())
     row = next(row for row in material.rows if row["status"] == "done" and row["task"] == "force")
     row["fit_s"] = 2.5  # as on a slow machine: its neighbours' times are in milliseconds
-    return make_report(material, folder / "report", Progress()).page
+    make_report(material, folder / "report", Progress())
+    return folder / "report" / "index.html"
 
 
 @pytest.fixture

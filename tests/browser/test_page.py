@@ -38,7 +38,8 @@ def test_one_file_is_all_that_is_read(opened, page):
     opened.execute_script("document.querySelectorAll('details').forEach(one => { one.open = true; })")
     assert [url for url in loaded(opened) if not url.startswith(("data:", "about:"))] == [page.as_uri()]
     assert opened.get_log("browser") == []
-    assert opened.execute_script("return [...document.images].every(one => one.naturalWidth > 0)")
+    widths = opened.execute_script("return [...document.images].map(one => one.naturalWidth)")
+    assert min(widths) > 0
 
 
 def test_sort_filter_and_details(opened):
@@ -59,7 +60,7 @@ def test_sort_filter_and_details(opened):
     filter_.send_keys("FOREST force")
     lines = "return [...document.querySelectorAll('#leaderboards tbody tr')].filter(one => one.offsetParent !== null)"
     assert ["forest" in line.text for line in opened.execute_script(lines)] == [True]
-    assert opened.find_element("id", "found").text == "1 of 10 cells"
+    assert opened.find_element("id", "found").text.split()[:3] == ["1", "of", "10"]
     filter_.clear()
     filter_.send_keys(" ")
     assert len(opened.execute_script(lines)) == 10
@@ -83,7 +84,8 @@ def test_the_page_never_scrolls_sideways_and_sentences_in_tables_are_read_withou
     )
     assert boxes
     assert max(boxes) <= 0
-    assert all(one.is_displayed() for one in opened.find_elements("css selector", "#leaderboards th button"))
+    buttons = opened.find_elements("css selector", "#leaderboards th button")
+    assert all(one.is_displayed() for one in buttons)
 
 
 def test_where_columns_go_on_at_a_side_there_is_a_shadow(opened):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import importlib
 import io
@@ -45,11 +44,11 @@ class LazyGroup(click.Group):
     """A group that knows its verbs by name and imports one when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which they are used, then those that other rooms contribute."""
+        """Return the verbs in the order in which they are used, then contributed ones."""
         return [*VERBS, *contributed("tactbench.verbs")]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the verb; offer the nearest one for one that is misspelt."""
+        """Import the verb; raises UnknownNameError with the nearest name."""
         if cmd_name.startswith("-"):
             return None
         if cmd_name in VERBS:
@@ -63,7 +62,7 @@ class LazyGroup(click.Group):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of verbs without importing them, but those that other rooms contribute."""
+        """Write the list of verbs; contributed ones alone are imported."""
         rows = [(name, text) for name, (_, text) in VERBS.items()]
         rows += [(name, verb.load().short_help) for name, verb in contributed("tactbench.verbs").items()]
         with formatter.section("Commands"):
@@ -81,34 +80,33 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted (128 + signal)."""
-    # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
-    # ones takes a sixth of the time of an import.
+    # Imports create thousands of lasting objects: with the default thresholds a sixth of their time is collection.
     gc.set_threshold(100_000, 50, 100)
     keep_threads()
     _open_streams()
     end_alike()
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
-        sys.stdout.flush()  # what is still held back may be refused as well
+        sys.stdout.flush()  # its buffer may be refused as well
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
         code = _interrupted(arguments, error.__cause__ or error)
     except click.ClickException as error:
         error.show()
         code = error.exit_code
     except BrokenPipeError:
-        # The reader of the output has ended (`| head`): this is no error of ours.
+        # The reader of the output has ended (`| head`).
         sys.stderr.close()
         _discard_output()
         code = 1
     except Exception as error:
-        code = _tell(error)
+        code = _report(error)
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _open_streams() -> None:
     """Open closed streams on the null device and escape text that is no UTF-8, so that printing never fails."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is None:  # a file that is opened later would get this number, and what is printed
+        if getattr(sys, name) is None:  # else a file that is opened later gets this number, and printed text
             stream = open(os.devnull, "w" if number else "r", errors="backslashreplace")  # noqa: PTH123, SIM115
             os.set_inheritable(stream.fileno(), True)
             setattr(sys, name, stream)
@@ -116,13 +114,10 @@ def _open_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-_KEPT = {
-    "run": "What was finished is kept; the same command goes on from there.",
-    "sensitivity": "What was finished is kept; the same command goes on from there.",
-    "cost": "What was finished is kept; the same command goes on from there.",
-    "emulate": "The emulated devices and their links are gone.",
-}
-"""What remains of an interrupted verb, as a message."""
+_KEPT = dict.fromkeys(
+    ("run", "sensitivity", "cost"), "What was finished is kept; the same command goes on from there."
+) | {"emulate": "The emulated devices and their links are gone."}
+"""Message for an interrupted verb."""
 
 
 def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
@@ -131,27 +126,21 @@ def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
     return 128 + (error.args[0] if isinstance(error, Interrupted) else signal.SIGINT)
 
 
-_REFUSALS = frozenset(getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EBADF"))
-"""Error numbers of writes to standard output that fail: the disk is full, or the terminal is gone."""
-
-
 def _discard_output() -> None:
     """Send standard output to the null device, so that flushing its buffer at exit raises no second error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _tell(error: Exception) -> int:
+def _report(error: Exception) -> int:
     from tactbench.core.errors import TactbenchError
     from tactbench.core.tables.text import visible_lines
 
-    if isinstance(error, OSError) and error.filename is None and error.errno in _REFUSALS:
+    if isinstance(error, OSError) and error.filename is None and error.strerror:
         click.echo(f"Error: The output cannot be written: {error.strerror}.", err=True)
         _discard_output()
         return 1
     if not isinstance(error, TactbenchError):
         raise error
     click.secho("Error: ", fg="red", bold=True, nl=False, err=True)
-    click.echo(visible_lines(error.message), err=True)
-    if error.hint:
-        click.echo(visible_lines(f"  {error.hint}"), err=True)
+    click.echo(visible_lines(f"{error.message}\n  {error.hint}" if error.hint else error.message), err=True)
     return error.exit_code

@@ -1,4 +1,4 @@
-"""``tactbench choose``: the leaderboard with columns that say which sensors meet given requirements."""
+"""``tactbench choose``: the leaderboard with columns that show which sensors meet given requirements."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def command(
     folder: Path | None, task_name: str, max_delay_ms: float | None, range_n: float | None, rate_hz: float | None,
     protocol: str | None, shape: str,
 ) -> None:  # fmt: skip
-    """Find the sensor that meets given requirements; say which miss them, and what is unknown.
+    """Find the sensors that meet given requirements, and show which requirements are missed or unknown.
 
-    FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
+    FOLDER is what `run --out` wrote. Default: tactbench-results, or the results that came with tactbench if that folder
     has none of the task.
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import json_array
-    from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, held_against
+    from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, with_requirements
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.view import View, grids
     from tactbench.core.plugins.registry import load_registry
@@ -56,7 +56,7 @@ def command(
         )
     specs = {one.name: one.spec for one in registry.sensors}
     table = build_table(found, questions={task.name: task.question})
-    table = held_against(table, Requirements(max_delay_ms, range_n, rate_hz), task, specs)
+    table = with_requirements(table, Requirements(max_delay_ms, range_n, rate_hz), task, specs)
     if shape == "json":
         click.echo(json_array(table), nl=False)
     else:

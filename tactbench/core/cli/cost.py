@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.options import RESULTS, format_option, options
+from tactbench.core.cli.options import JOBS, RESULTS, format_option, options
 from tactbench.core.spec.bounds import MOST_REPEATS
 from tactbench.core.spec.matrix import REPLICATES
 
@@ -26,8 +26,7 @@ from tactbench.core.spec.matrix import REPLICATES
                  help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
     click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
                  help="Number of timing rounds of --twin without --task."),
-    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-                 help="Parallel worker processes. Default: one per usable core."),
+    JOBS,
     RESULTS,
 )  # fmt: skip
 @format_option("table", "json", "csv")
@@ -37,8 +36,8 @@ def command(
     """Measure what accuracy costs in time, and draw it.
 
     One setting after another is varied: trees, window, sampling rate, training sessions, estimators; with --twin the
-    rung and the tolerance of the simulation. Files go into the folder cost of the result folder, and grow with every
-    replicate; what is there already is reused.
+    rung and the tolerance of the simulation. Files are written into the folder cost of the result folder, whose
+    finished cells are reused.
     """
     from tactbench.core.errors import UsageError
 
@@ -47,7 +46,7 @@ def command(
             raise UsageError("--twin without --task takes --sensor and --rounds.", hint="Leave the others out.")
         from tactbench.core.cli.cost_twin import show_twin
 
-        show_twin(sensors, out / "cost", shape, rounds=rounds)
+        show_twin(sensors, out / "cost", shape, rounds)
         return
     if task is None or (len(sensors) != 1 and not twin):
         raise UsageError(
@@ -61,10 +60,9 @@ def _show_knobs(
     sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
-    """Measure the settings of an estimator, or of the simulation; print and write the results, also when stopped."""
+    """Measure the settings of an estimator, or of the simulation; print and write the results."""
     from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cost.knobs import measure, settings_of, simulations_of
-    from tactbench.core.cost.task_score import quick_estimator
+    from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.run import EngineChoice
     from tactbench.core.plugins.declared import declared_in, with_declared
@@ -85,23 +83,18 @@ def _show_knobs(
     names = estimators or ((quick_estimator(registry, task),) if twin else spec.estimators[:1])
     chosen = [registry.estimators[name] for name in names]
     settings = list(simulations_of(rig, chosen[0], protocol) if twin else settings_of(spec, chosen, protocol))
-    found: dict[Path, dict[str, Any]] = {}
-    try:
-        for sensor in sensors or matrix_called().sensors:
-            place = folder / f"{sensor}-{task}{'-twin' if twin else ''}"
-            matrix = MatrixSpec(rig=rig.name, sensors=(sensor,), tasks=(TaskChoice(name=task),))
-            with progress() as display:
-                for known in measure(
-                    matrix, settings, folder, repeats=repeats or (REPLICATES if rig.simulated else 1),
-                    choice=EngineChoice(jobs=jobs), recordings=recordings, progress=display,
-                ):  # fmt: skip
-                    found[place] = known
-                    write_trade(known, place)
-    finally:  # also what there is when it is stopped
-        if shape != "table" and found:
-            print_records([{"sensor": known["sensor"], **one} for known in found.values() for one in known["settings"]],
-                          shape)  # fmt: skip
-        for place, known in found.items():
-            if shape == "table":
-                print_tables([trade_table(known)])
-            remark(f"Files: {place}.json, .png, .pdf")
+    repeats = repeats or (REPLICATES if rig.simulated else 1)
+    records: list[dict[str, Any]] = []
+    for sensor in sensors or matrix_called().sensors:
+        matrix = MatrixSpec(rig=rig.name, repeats=repeats, sensors=(sensor,), tasks=(TaskChoice(name=task),))
+        choice = EngineChoice(jobs=jobs)
+        with progress() as display:
+            known = measure(matrix, settings, folder, choice=choice, recordings=recordings, progress=display)
+        place = folder / f"{sensor}-{task}{'-twin' if twin else ''}"
+        write_trade(known, place)
+        remark(f"Files: {place}.json, .png, .pdf")
+        if shape == "table":
+            print_tables([trade_table(known)])
+        records += ({"sensor": sensor, **one} for one in known["settings"])
+    if shape != "table":
+        print_records(records, shape)

@@ -7,69 +7,57 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.cli.grid import print_records
-from tactbench.core.tables.terminal import remark
-
 if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
-    from tactbench.core.plugins.interfaces import CostPoint, CostStudy
+    from tactbench.core.plugins.interfaces import CostPoint
 
 _COLUMNS = (
-    "sensor",
-    "observable",
-    "marks",
-    "way",
-    "rung",
-    "seconds",
-    "error_rms",
-    "error_worst",
-    "unit",
-    "noise",
-    "reason",
-)
+    "sensor", "observable", "marks", "way", "rung", "seconds", "error_rms", "error_worst", "unit", "noise", "reason",
+)  # fmt: skip
 """Keys of a record that tables show."""
 
 
-def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int) -> None:
+def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> None:
     """Measure the simulated rig for `sensors` (default: the matrix's); print `shape`, write files into `out`.
-
-    What has been measured when it is stopped is printed and written.
 
     Parameters
     ----------
     rounds
-        How often each recording is timed.
+        Number of times that each recording is timed.
     """
+    from tactbench.core.cli.grid import print_records
     from tactbench.core.cost.precision import Skipped, measured
     from tactbench.core.errors import UsageError
+    from tactbench.core.files import replace_file, writable
+    from tactbench.core.plugins.interfaces import CostStudy
     from tactbench.core.plugins.registry import load_object, load_registry
+    from tactbench.core.report.figures.style import save, styled
+    from tactbench.core.report.figures.trade import draw_precision
     from tactbench.core.study.progress import progress
     from tactbench.core.study.shipped import matrix_called
+    from tactbench.core.tables.terminal import remark
+    from tactbench.core.tables.text import json_text
 
     registry = load_registry()
     name = registry.first_rig("simulated")
-    descriptor = registry.rigs[name]
-    if descriptor.work_precision is None:
+    where = registry.rigs[name].work_precision
+    if where is None:
         raise UsageError(f"The rig {name!r} declares no study of what its accuracy costs.", hint="Use the rig twin.")
-    chosen = [registry.sensors[sensor] for sensor in sensors or matrix_called().sensors]
-    points: list[CostPoint] = []
-    skipped: list[Skipped] = []
-    study: CostStudy | None = None
-    try:
-        with progress() as display:
-            for sensor in chosen:
-                study = load_object(descriptor.work_precision)(sensor, rounds=rounds)
-                for one in measured(study, sensor.name, display):
-                    skipped.append(one) if isinstance(one, Skipped) else points.append(one)
-    finally:
-        if study is not None and (points or skipped):
-            _print(records := _records(points, skipped), study, shape)
-            _write(points, records, study, out / name)
-
-
-def _print(records: Sequence[dict[str, Any]], study: CostStudy, shape: str) -> None:
+    found: list[CostPoint | Skipped] = []
+    with progress() as display:
+        for sensor in sensors or matrix_called().sensors:
+            study: CostStudy = load_object(where)(registry.sensors[sensor], rounds=rounds)
+            found += measured(study, sensor, display)
+    points = [one for one in found if not isinstance(one, Skipped)]
+    records = _records(points, [one for one in found if isinstance(one, Skipped)])
     print_records(records, shape, title=study.title, columns=_COLUMNS)
     remark(f"{study.reference}\nenough: the quickest whose error is below a third of the noise.")
+    with writable(out), styled():
+        out.mkdir(parents=True, exist_ok=True)
+        replace_file(out / f"{name}.json", (json_text(records, indent=1) + "\n").encode())
+        if points:
+            save(draw_precision(points, study.title), out / name)
+    remark(f"Files: {out / name}.json{', .png, .pdf' if points else ''}")
 
 
 def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[dict[str, Any]]:
@@ -91,17 +79,3 @@ def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[di
               for one in skipped]  # fmt: skip
     keys = dict.fromkeys((*_COLUMNS, *(key for record in found for key in record)))
     return [{key: record.get(key) for key in keys} for record in found]
-
-
-def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, place: Path) -> None:
-    from tactbench.core.files import replace_file, writable
-    from tactbench.core.report.figures.style import save, styled
-    from tactbench.core.report.figures.trade import draw_precision
-    from tactbench.core.tables.text import json_text
-
-    with writable(place.parent), styled():
-        place.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(place.with_name(f"{place.name}.json"), (json_text(records, indent=1) + "\n").encode())
-        if points:
-            save(draw_precision(points, study.title), place)
-    remark(f"Files: {place}.json{', .png, .pdf' if points else ''}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -37,45 +38,35 @@ def command(
     ctx: click.Context, source: Path, root: Path | None, out: Path | None, replace: bool, sensor: str | None,
     options: tuple[str, ...], labels: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Convert foreign tables, as MAPPING (a YAML file) says, or with --sensor a LOG, into recordings.
+    """Convert foreign tables, as described by MAPPING (a YAML file), or with --sensor a LOG, into recordings.
 
-    All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md. Exit code 1 if
-    what was written has an error, as `inspect` finds them.
+    All of them are written, or none. Values marked as "no sample" are counted. See docs/mappings.md. Exit code 1 if
+    `inspect` finds an error in what was written.
     """
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.recording.device_log import import_log
+    from tactbench.core.recording.mapping import import_tables
+    from tactbench.core.spec.scene import Role
+    from tactbench.core.study.progress import progress
+
     if sensor is None:
         if options or labels:
             raise click.UsageError("--option and --label are for logs: name the --sensor.")
         target = Path("recordings") / source.stem if out is None else out
-        report = _import_tables(source, root, target, replace)
+        with progress() as display:
+            report = import_tables(source, root=root, out=target, progress=display, replace=replace)
     else:
         if root is not None:
             raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
         target = Path("recordings") / f"{source.stem}.h5" if out is None else out
-        report = _import_log(source, sensor, _pairs("--option", options), _pairs("--label", labels), target, replace)
+        own, descriptor = _pairs("--label", labels), load_registry().sensors[sensor]
+        session, role = str(own.pop("session", "1")), own.pop("role", None)
+        if role is not None and role not in get_args(Role):
+            raise click.UsageError(f"--label role={role}: one of {', '.join(get_args(Role))} is expected.")
+        report = import_log(source, descriptor, _pairs("--option", options), out=target, session=session, role=role,
+                            labels=own, replace=replace)  # fmt: skip
     print_fields(list(fields(report, target)))
     ctx.exit(any(finding.severity == "error" for one in report.recordings for finding in one.findings))
-
-
-def _import_tables(mapping: Path, root: Path | None, out: Path, replace: bool) -> ImportReport:
-    from tactbench.core.recording.mapping import import_tables
-    from tactbench.core.study.progress import progress
-
-    with progress() as display:
-        return import_tables(mapping, root=root, out=out, progress=display, replace=replace)
-
-
-def _import_log(
-    log: Path, sensor: str, options: dict[str, Any], labels: dict[str, Any], out: Path, replace: bool
-) -> ImportReport:
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.recording.device_log import import_log
-    from tactbench.core.spec.scene import Role
-
-    session, role = str(labels.pop("session", "1")), labels.pop("role", None)
-    if role is not None and role not in get_args(Role):
-        raise click.UsageError(f"--label role={role}: one of {', '.join(get_args(Role))} is expected.")
-    descriptor = load_registry().sensors[sensor]
-    return import_log(log, descriptor, options, out=out, session=session, role=role, labels=labels, replace=replace)
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
@@ -93,8 +84,6 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
 
 def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the facts about an import, field by field."""
-    from collections import Counter
-
     stated = {
         "title": report.title, "recordings": len(report.recordings), "in": folder,
         "sensors": tuple(dict.fromkeys(one.meta.sensor.name for one in report.recordings)),

@@ -60,17 +60,13 @@ def describe(recording: Recording) -> dict[str, Any]:
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     return {
-        "file": str(recording.path),
-        "complete": recording.complete,
+        "file": str(recording.path), "complete": recording.complete,
         "content_sha256": recording.verify() if recording.complete else recording.content_digest(),
-        "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}),
-        "sensor": meta.sensor.name,
-        "streams": [
-            {"of": "sensor" if name in own else "reference", **_stream(recording, name)}
-            for name in recording.stream_names
-        ],
+        "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}), "sensor": meta.sensor.name,
+        "streams": [{"of": "sensor" if name in own else "reference", **_stream(recording, name)}
+                    for name in recording.stream_names],
         "findings": findings,
-    }
+    }  # fmt: skip
 
 
 def _stream(recording: Recording, name: str) -> dict[str, Any]:
@@ -83,15 +79,11 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
     for channel in stream.spec.channels:
         kinds.setdefault((channel.kind, channel.unit), []).append(channel.name)
     return {
-        "stream": name,
-        "rows": len(stream),
-        "dtype": stream.spec.dtype,
-        "seconds": seconds,
-        "mean_rate_hz": rate,
+        "stream": name, "rows": len(stream), "dtype": stream.spec.dtype, "seconds": seconds, "mean_rate_hz": rate,
         "stated_rate_hz": stream.spec.rate_hz,
         "channels": [{"kind": kind, "unit": unit, "names": names} for (kind, unit), names in kinds.items()],
         "annotations": sorted(stream.annotations),
-    }
+    }  # fmt: skip
 
 
 def _print(about: dict[str, Any]) -> None:
@@ -111,9 +103,12 @@ def _print(about: dict[str, Any]) -> None:
     click.echo()
     records = []
     for one in about["streams"]:
-        channels = (f"{len(each['names'])} {each['kind']} [{each['unit']}] {_ends(each['names'])}"
-                    for each in one["channels"])  # fmt: skip
-        records.append({**one, "channels": "; ".join(channels)})
+        texts = []
+        for kind in one["channels"]:
+            names = kind["names"]
+            ends = ", ".join(names) if len(names) <= 4 else f"{names[0]} … {names[-1]}"
+            texts.append(f"{len(names)} {kind['kind']} [{kind['unit']}] {ends}")
+        records.append({**one, "channels": "; ".join(texts)})
     print_records(records, "table", title="streams", columns=_COLUMNS)
     fields = [(finding["severity"], finding["message"]) for finding in about["findings"]]
     print_fields(fields or [("healthy", "nothing was found")])
@@ -126,7 +121,3 @@ def _clock(clock: dict[str, Any]) -> dict[str, Any]:
     error_us = max((line["bound_ns"] * 1e-3 for line in lines if line["bound_ns"] is not None), default=None)
     return {"source": clock["source"], "method": clock["method"], "drift ppm": drift, "error us": error_us,
             "breaks": clock["breaks"]}  # fmt: skip
-
-
-def _ends(names: list[str]) -> str:
-    return ", ".join(names) if len(names) <= 4 else f"{names[0]} … {names[-1]}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import DEFAULT_FOLDER
+from tactbench.core.cli.options import DEFAULT_FOLDER, options
 from tactbench.core.tables.terminal import WITHOUT_EDGE, show
 
 if TYPE_CHECKING:
@@ -18,42 +18,49 @@ if TYPE_CHECKING:
 
 TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
 FOR_PEOPLE = ("table", "md", "latex")
-"""Formats that print less than everything."""
-
-_FILTERS = ("sensor", "task", "protocol", "split", "estimator")
-
-
-def _filters(command: Any) -> Any:
-    for key in reversed(_FILTERS):
-        option = click.option(f"--{key}", multiple=True, metavar="NAME", help=f"Only this {key}; may be repeated.")
-        command = option(command)
-    return command
+"""Formats whose columns can be selected."""
 
 
 @click.command(name="leaderboard")
 @click.argument("folder", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, required=False)
-@_filters
-@click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
-              help="Only the first N answers of each sensor in each block; N is 1 where it is left out.")  # fmt: skip
-@click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell.")
-@click.option("--wide", is_flag=True, help="All columns.")
-@click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
-              help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
-@click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx.")  # fmt: skip
+@options(
+    *(click.option(f"--{key}", multiple=True, metavar="NAME", help=f"Only this {key}; may be repeated.")
+      for key in ("sensor", "task", "protocol", "split", "estimator")),
+    click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
+                 help="Only the first N answers of each sensor in each block. Default of N: 1."),
+    click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell."),
+    click.option("--wide", is_flag=True, help="All columns."),
+    click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
+                 help="Output format. Default: table, or that of the suffix of the file given with --to."),
+    click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+                 help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx."),
+)  # fmt: skip
 def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.formats import SUFFIXES
+    from tactbench.core.leaderboard.view import View, known_columns
     from tactbench.core.leaderboard.view import best as best_of
     from tactbench.core.study.results import opened, shown_rows, table_of
 
-    shape = _format_of(shape, to)
-    view = view_of(folder, wide=wide, columns=columns, shape=shape)
+    shape = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
+    if shape is None:
+        raise UsageError(f"The suffix of {to} names no format.",
+                         hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
+    if columns is not None and shape not in FOR_PEOPLE:
+        raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
+    view = View(wide, known_columns(columns.split(",") if columns is not None else ()), named_folder(folder))
     store = opened(folder)
     table = table_of(store, _only(shown_rows(store), filters))
     print_table(best_of(table, best) if best else table, shape, view, to=to)
+
+
+def named_folder(folder: Path) -> str:
+    """Return a result folder as a command has to name it: empty for the default one."""
+    return "" if folder == DEFAULT_FOLDER else str(folder)
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
@@ -74,52 +81,13 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
     return kept
 
 
-def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, shape: str = "table") -> View:
-    """Return which columns of a table are printed.
-
-    Parameters
-    ----------
-    columns
-        Names, separated by commas.
-
-    Raises
-    ------
-    UsageError
-        If there is no such column, or `shape` always holds them all.
-    """
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.view import View, known_columns
-
-    if columns is not None and shape not in FOR_PEOPLE:
-        raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
-    names = [name.strip() for name in columns.split(",")] if columns is not None else []
-    where = "" if folder == DEFAULT_FOLDER else str(folder)
-    return View(wide=wide, columns=known_columns(names), folder=where)
-
-
-def _format_of(shape: str | None, to: Path | None) -> str:
-    """Return the given format, or that of the file's suffix; raises UsageError if the suffix is unknown."""
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.formats import SUFFIXES
-
-    found = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
-    if found is None:
-        raise UsageError(f"The suffix of {to} names no format.",
-                         hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
-    return str(found)
-
-
 def print_table(table: Table, shape: str, view: View, *, to: Path | None = None) -> None:
-    """Print a leaderboard on stdout, or write it to a file.
+    """Print a leaderboard on stdout, or write it to the file `to`.
 
     Parameters
     ----------
     shape
         One of `TABLE_FORMATS`; of a file also ``parquet`` or ``xlsx``.
-    view
-        What is printed of it in the formats `FOR_PEOPLE`.
-    to
-        The file to write in place of stdout.
 
     Raises
     ------

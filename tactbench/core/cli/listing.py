@@ -13,8 +13,8 @@ from tactbench.core.tables.text import json_text
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
 
-SCENARIOS, PLUGINS = "scenarios", "plugins"
-FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "indenters", "profiles", SCENARIOS)
+PLUGINS = "plugins"
+FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "indenters", "profiles")
 
 
 @click.command(name="list")
@@ -24,8 +24,8 @@ FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "ind
 def command(ctx: click.Context, family: str | None, shape: str) -> None:
     """List what is installed.
 
-    Devices are force sensors and motors; scenarios belong to sensors. `plugins` lists installed plugins and why one
-    could not be used; its exit code is 1 if one could not.
+    Devices are force sensors and motors. `plugins` lists installed plugins, and the reasons why some could not be used;
+    the exit code is then 1.
     """
     from tactbench.core.plugins.registry import load_registry
 
@@ -40,19 +40,12 @@ def command(ctx: click.Context, family: str | None, shape: str) -> None:
     for name, entries in found.items():
         click.secho(name, bold=True)
         print_fields([(f"  {entry}", title) for entry, title in entries.items()])
-    tell_failed(registry)
+    remark_failed(registry)
 
 
 def _titles(registry: Registry, family: str) -> dict[str, str]:
-    if family != SCENARIOS:
-        members: Any = registry.families()[family]
-        return {one.name: getattr(one, "title", None) or one.spec.title for one in members}
-    found: dict[str, str] = {}
-    for sensor in registry.sensors:
-        for name, scenario in sensor.spec.scenarios.items():
-            before = f"{found[name]}; " if name in found else ""
-            found[name] = f"{before}{sensor.name}: {scenario.title}"
-    return found
+    members: Any = registry.families()[family]
+    return {one.name: getattr(one, "title", None) or one.spec.title for one in members}
 
 
 def _plugins(registry: Registry, shape: str) -> None:
@@ -73,8 +66,8 @@ def _plugins(registry: Registry, shape: str) -> None:
         click.secho(text, fg="red")
 
 
-def tell_failed(registry: Registry) -> None:
-    """Print to stderr which plugins could not be loaded; print nothing if all could."""
+def remark_failed(registry: Registry) -> None:
+    """Print on stderr which plugins could not be loaded, if any."""
     from tactbench.core.tables.terminal import remark
 
     if registry.failures or registry.refused:

@@ -28,32 +28,35 @@ BAR = 8
 class StreamState:
     """The newest samples of one stream, and counts of its rows.
 
-    One thread calls :meth:`take`; another may read the attributes meanwhile: each is replaced as a whole, none is
-    changed in place.
+    One thread calls :meth:`take`; another may read the attributes meanwhile: each is replaced as a whole.
+
+    Attributes
+    ----------
+    rows, bad, lost
+        Rows received; rows with a missing, suspect or saturated sample; rows missing by the device's sequence numbers.
+    first, latest
+        (channels,) the first and the newest sample of each channel that was not missing; NaN before.
+    span_ns
+        Times of the first and the newest row.
+    rate_hz
+        Mean rate since the first row.
+    seen_s
+        Time of the newest block [s of `time.monotonic`].
     """
 
     def __init__(self, spec: StreamSpec) -> None:
         self.spec = spec
-        self.rows = 0
-        self.bad = 0
-        """Rows in which a sample is missing, suspect or saturated."""
-        self.lost = 0
-        """Rows that never came, by the device's numbers."""
+        self.rows = self.bad = self.lost = 0
         self.first: Any = None
-        """(channels,) the first sample of each channel that was not missing; NaN where there was none."""
         self.latest: Any = None
-        """(channels,) the last such sample."""
         self.span_ns: tuple[int, int] | None = None
-        """Times of the first and the last row."""
         self.rate_hz: float | None = None
-        """Mean rate since the first row."""
         self.seen_s = 0.0
-        """When the last block came [s of `time.monotonic`]."""
         self._begin: tuple[int, int] | None = None
         self._first_number: int | None = None
 
     def take(self, block: Block) -> None:
-        """Add a block: its last row is remembered, its rows are counted."""
+        """Add a block: count its rows and keep its newest samples."""
         import numpy as np
 
         if not len(block.data):
@@ -72,12 +75,17 @@ class StreamState:
             self.lost = max(0, int(block.sequence[-1]) - self._first_number + 1 - self.rows)
         if block.t_ns is not None:
             first_ns, last_ns = int(block.t_ns[0]), int(block.t_ns[-1])
-            if self._begin is None:  # rows that came together have one time, and count as one
+            if self._begin is None:  # the rows of a block that have one time count as one
                 self._begin = (first_ns, 1) if last_ns > first_ns else (last_ns, self.rows)
             begin_ns, rows = self._begin
             self.span_ns = begin_ns, last_ns
             self.rate_hz = (self.rows - rows) / (last_ns - begin_ns) * 1e9 if last_ns > begin_ns else None
         self.seen_s = time.monotonic()
+
+    def values(self) -> Iterator[tuple[ChannelSpec, float, float]]:
+        """Yield the channels with their first and their newest sample."""
+        if self.latest is not None:
+            yield from zip(self.spec.channels, self.first.tolist(), self.latest.tolist(), strict=True)
 
 
 class LiveView:
@@ -121,14 +129,14 @@ class LiveView:
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Return a context in which a prompt has the terminal."""
-        drawing = self._live is not None and self._live.is_started
-        if self._live is not None:
-            self._live.stop()
+        live = self._live if self._live is not None and self._live.is_started else None
+        if live is not None:
+            live.stop()
         try:
             yield
         finally:
-            if self._live is not None and drawing:
-                self._live.start()
+            if live is not None:
+                live.start()
 
     def __enter__(self) -> Self:
         return self
@@ -146,8 +154,7 @@ class LiveView:
         from rich.console import Group
         from rich.text import Text
 
-        sensor = [state for state in self._states.values() if state.spec not in self._reference]
-        values = [value for state in sensor for value in _values(state)]
+        values = [value for one in self._states.values() if one.spec not in self._reference for value in one.values()]
         changes = [(channel, latest - first) for channel, first, latest in values if channel.kind == "taxel"]
         full = max((abs(change) for _, change in changes if change == change), default=0.0)
         others = [
@@ -163,10 +170,7 @@ class LiveView:
         return Group(*parts)
 
     def _course(self) -> str:
-        """Return the time since the first sample, and the reference's force beside that of the profile.
-
-        The force is the channel `normal` or `fz`, else the first of kind force.
-        """
+        """Return the time since the first sample, and the force of the reference beside that of the profile."""
         import numpy as np
 
         from tactbench.core.spec import units
@@ -178,7 +182,7 @@ class LiveView:
         forces = [
             (channel.name not in ("normal", "fz"), f"{latest * units.conversion(channel.unit, 'N'):.2f}")
             for spec in self._reference
-            for channel, _, latest in _values(self._states[spec.name])
+            for channel, _, latest in self._states[spec.name].values()
             if channel.kind == "force"
         ]
         force = min(forces, key=lambda one: one[0], default=(True, "-"))[1]
@@ -197,12 +201,6 @@ class LiveView:
             wrong = silent_s >= SILENT_S or state.lost or state.bad
             text = f"{name}: {state.rows} rows, {rate}, {state.lost} lost, {state.bad} bad"
             yield Text(text, "bold red" if wrong else "")
-
-
-def _values(state: StreamState) -> Iterator[tuple[ChannelSpec, float, float]]:
-    """Yield the channels of a stream with their first and their latest sample."""
-    if state.latest is not None:
-        yield from zip(state.spec.channels, state.first.tolist(), state.latest.tolist(), strict=True)
 
 
 def _taxel(channel: ChannelSpec, change: float, full: float) -> Text:

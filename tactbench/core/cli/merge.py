@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from tactbench.core.tables.text import command_line
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @click.command(name="merge")
@@ -29,7 +24,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     from tactbench.core.matrix.merge import merge
     from tactbench.core.tables.terminal import remark
 
-    merged = merge(folders, out, also=partial(_write_tables, folders))
+    merged = merge(folders, out, also=_write_tables)
     remark(f"{len(merged.rows)} cells, {merged.recordings} recordings.")
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
@@ -38,13 +33,11 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     ctx.exit(1 if merged.left_out else 0)
 
 
-def _write_tables(folders: Sequence[Path], merged: Path) -> None:
-    """Write the conformance levels of the sensors and the tables of the leaderboard into a merged folder."""
+def _write_tables(merged: Path) -> None:
+    """Write the tables of the leaderboard into a merged folder."""
     from tactbench.core.leaderboard.formats import write_tables
-    from tactbench.core.leaderboard.levels import merge_levels
     from tactbench.core.matrix.store import Store
     from tactbench.core.study.results import shown_rows, table_of
 
-    merge_levels(folders, merged)
     store = Store(merged)
     write_tables(table_of(store, shown_rows(store)), merged)

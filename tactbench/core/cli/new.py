@@ -11,10 +11,10 @@ import click
 
 KINDS = ("sensor", "rig", "task", "estimator", "effect")
 NAME = r"[a-z][a-z0-9]*(-[a-z0-9]+)*"
-_TESTED_WITH = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
-                "estimator": "--sensor ideal --task force --estimator",
-                "effect": "--sensor ideal --task force --effects",
-                "sensor": "--task contact-location --sensor"}  # fmt: skip
+_OPTIONS = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
+            "estimator": "--sensor ideal --task force --estimator", "effect": "--sensor ideal --task force --effects",
+            "sensor": "--task contact-location --sensor"}  # fmt: skip
+"""Options of `run` that try a new plugin; its name follows."""
 
 
 @click.command(name="new")
@@ -35,38 +35,28 @@ def command(kind: str, name: str, into: Path) -> None:
             f"{name!r} is no name for a {kind}.",
             hint=f"Lower-case letters, digits and single hyphens, a letter first, not `all`: my-{kind}, for example.",
         )
-    family = load_registry().families()[f"{kind}s"]
-    if name in family:
+    if name in load_registry().families()[f"{kind}s"]:
         raise UsageError(f"A {kind} called {name} is installed already.", hint="Choose another name.")
     package = rendered(kind, name)
     taken = [path for path in package if (into / path).exists()]
     if taken:
-        raise UsageError(f"{into / taken[0]} is there already.", hint="Give an empty folder: --into DIR.")
+        raise UsageError(f"{into / taken[0]} exists already.", hint="Give an empty folder: --into DIR.")
     for path, text in package.items():
         (into / path).parent.mkdir(parents=True, exist_ok=True)
         (into / path).write_text(text, encoding="utf-8")
         click.echo(into / path)
-    asked = f"+{name}" if kind == "effect" else name
     here = "" if into == Path() else f"cd {into} && "
-    click.echo(
-        f"Try next:\n  {here}pip install -e .\n  tactbench check {name}\n  tactbench run {_TESTED_WITH[kind]} {asked}",
-        err=True,
-    )
+    option = f"{_OPTIONS[kind]} {'+' * (kind == 'effect')}{name}"
+    click.echo(f"Try next:\n  {here}pip install -e .\n  tactbench check {name}\n  tactbench run {option}", err=True)
 
 
 def rendered(kind: str, name: str) -> dict[str, str]:
-    """Return the package's files: path -> text."""
+    """Return the texts of the package's files, by path."""
     from tactbench.core.plugins.hookspecs import API_VERSION
 
     module = f"tactbench_{name.replace('-', '_')}"
-    words = {
-        "kind": kind,
-        "name": name,
-        "module": module,
-        "distribution": f"tactbench-{name}",
-        "title": name.replace("-", " ").capitalize(),
-        "api": str(API_VERSION),
-    }
+    words = {"kind": kind, "name": name, "module": module, "distribution": f"tactbench-{name}",
+             "title": name.replace("-", " ").capitalize(), "api": str(API_VERSION)}  # fmt: skip
     places = {"pyproject.toml": "pyproject.toml", "README.md": "README.md", "ci.yaml": ".github/workflows/test.yaml",
               "test.py": f"tests/test_{module}.py"}  # fmt: skip
     found = {}

@@ -47,6 +47,8 @@ def format_option(*shapes: str) -> Callable[[Command], Command]:
 YES = click.option("--yes", is_flag=True, help="Do not prompt.")
 RESULTS = click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
                        metavar="DIR", help="Result folder.")  # fmt: skip
+JOBS = click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+                    help="Parallel worker processes. Default: one per usable core.")  # fmt: skip
 
 EFFECTS = click.option(
     "--effects", metavar="LIST",

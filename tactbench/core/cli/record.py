@@ -31,18 +31,9 @@ if TYPE_CHECKING:
 @YES
 @click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
 def command(
-    sensor: str,
-    rig: str | None,
-    rig_file: str | None,
-    indenter: str | None,
-    profile: str | None,
-    effects: str | None,
-    settings: tuple[str, ...],
-    seed: int,
-    out: Path,
-    yes: bool,
-    live: bool,
-) -> None:
+    sensor: str, rig: str | None, rig_file: str | None, indenter: str | None, profile: str | None, effects: str | None,
+    settings: tuple[str, ...], seed: int, out: Path, yes: bool, live: bool,
+) -> None:  # fmt: skip
     """Record one scene into one file; `tactbench list` names indenters and profiles."""
     import time
     from contextlib import ExitStack, nullcontext
@@ -55,6 +46,7 @@ def command(
     from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.provenance.gather import gather
     from tactbench.core.recording.image import require_free
+    from tactbench.core.recording.reader import read_meta
     from tactbench.core.study.operator import TerminalOperator
     from tactbench.core.study.scenes import scene_of
     from tactbench.core.study.simulation import simulation_of
@@ -67,14 +59,12 @@ def command(
     rig = rig or (devices.rig if devices else registry.first_rig("simulated"))
     scene = scene.simulated_as(simulation_of(registry, rig, [sensor], effects, settings))
     require_free(out)
+    emulated = devices is not None and devices.emulated
+    mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
     provenance = gather(registry)
     try:
         with ExitStack() as stack:
-            view: LiveView | None = None
-            if live:
-                emulated = devices is not None and devices.emulated
-                mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
-                view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
+            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}")) if live else None
             operator = TerminalOperator(yes=yes, paused=view.paused if view else nullcontext)
             built = _built(registry, rig, devices, operator)
             request = RecordingRequest(
@@ -85,26 +75,19 @@ def command(
                 watch=view.watch if view else None, complete_interrupted=True,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
-        if _interrupted(out):
+        if out.exists() and read_meta(out).excluded.startswith("interrupted"):
             remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
         elif isinstance(error, KeyboardInterrupt):
             remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
         raise
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
-    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}")
+    click.echo(f"{out}: {sensor} on {rig}{mark}, {scene.indenter}")
     for name, value in meta.assumptions.items():
         remark(f"  assumed: {name} = {value}")
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")
     if meta.excluded:
         remark(f"It takes no part in a score unless --include-incomplete is given: {meta.excluded}.")
         click.get_current_context().exit(1)
-
-
-def _interrupted(path: Path) -> bool:
-    """Return whether the file exists and holds a recording that was interrupted."""
-    from tactbench.core.recording.reader import read_meta
-
-    return path.exists() and read_meta(path).excluded.startswith("interrupted")
 
 
 def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:

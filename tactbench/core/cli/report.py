@@ -11,36 +11,29 @@ from tactbench.core.cli.options import DEFAULT_FOLDER
 
 @click.command(name="report")
 @click.argument("folder", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, required=False)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Where page and figures are put; default: FOLDER/report.",
-)
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of page and figures. Default: FOLDER/report.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, folder: Path, out: Path | None) -> None:
-    """Make one page of all results in FOLDER, which is what `run --out` wrote.
-
-    The published numbers are printed beside ours.
-    """
+    """Write one page of all results in FOLDER (what `run --out` wrote), and print published numbers beside ours."""
     from tactbench.core.cli.grid import print_tables
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.page import make_report
+    from tactbench.core.report.published import published_table
     from tactbench.core.report.results import open_results
     from tactbench.core.study.progress import progress
     from tactbench.core.study.results import opened
     from tactbench.core.tables.terminal import remark
 
-    store = opened(folder)
+    store, out = opened(folder), out or folder / "report"
     results = open_results(store, load_registry())
-    for sentence in store.troubles:
-        remark(f"{folder}: {sentence}")
     with progress() as display:
-        made = make_report(results, out or folder / "report", display)
-    print_tables([table for table in [made.reproduction] if table.lines])
-    for sentence in made.missing:
+        page = make_report(results, out, display)
+    published = published_table(results.registry, results.rows)
+    print_tables([published] if published.lines else [])
+    for sentence in (*(f"{folder}: {one}" for one in store.troubles), *page.missing):
         remark(f"Left out: {sentence}")
-    for sentence in made.broken:
+    for sentence in page.broken:
         remark(f"Failed: {sentence}")
-    remark(f"Page: {made.page}")
-    ctx.exit(1 if made.broken else 0)
+    remark(f"Page: {out / 'index.html'}")
+    ctx.exit(1 if page.broken else 0)

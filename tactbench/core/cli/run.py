@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table, view_of
-from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
+from tactbench.core.cli.leaderboard import TABLE_FORMATS, named_folder, print_table
+from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.run import Outcome
-    from tactbench.core.matrix.store import Store
-
-_REASON_CHARACTERS = 200
-"""Characters of a reason that are printed; the row has the whole of it."""
 
 
 @click.command(name="run")
@@ -48,8 +41,7 @@ _REASON_CHARACTERS = 200
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
                  show_default=True,
                  help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
-    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-                 help="Parallel worker processes. Default: one per usable core."),
+    JOBS,
     click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
                  help="Time limit per cell and per recording. Default: none."),
     click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
@@ -64,48 +56,43 @@ _REASON_CHARACTERS = 200
 def command(
     ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **options_given: Any
 ) -> None:
-    """Acquire, evaluate, rank.
+    """Acquire, evaluate and rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
     holds already is reused.
     """
-    from tactbench.core.cli.listing import tell_failed
+    from tactbench.core.cli.listing import remark_failed
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.table import over_all
+    from tactbench.core.leaderboard.view import View
     from tactbench.core.plugins.registry import installed
     from tactbench.core.study.results import table_of
     from tactbench.core.study.study import Study, carry_out
 
-    tell_failed(installed())
+    remark_failed(installed())
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **options_given))
     table = table_of(store, over_all(store, outcome.rows))
-    print_table(table, shape, view_of(store.folder))
+    print_table(table, shape, View(folder=named_folder(store.folder)))
     write_tables(table, store.folder)
-    _farewell(outcome, store)
-    ctx.exit(1 if outcome.failures else 0)
-
-
-def _farewell(outcome: Outcome, store: Store) -> None:
-    """Print how many cells were computed, and where the files are."""
-    folder = store.folder
-    found = len(outcome.rows) - outcome.computed
-    remark(f"\n{found} of {len(outcome.rows)} answers were found finished, {outcome.computed} computed now; "
+    count = len(outcome.rows)
+    remark(f"\n{count - outcome.computed} of {count} answers were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
     if store.superseded:
         remark(f"{len(store.superseded)} of them supersede answers of the same names from other recordings: tables "
                "show the latest. Another --out DIR keeps both.")  # fmt: skip
-    remark(f"Files: {folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
-    tell_stopped(outcome.failures, folder)
+    remark(f"Files: {store.folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
+    remark_stopped(outcome.failures, store.folder)
+    ctx.exit(1 if outcome.failures else 0)
 
 
-def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Print a line for every cell of `rows` with its reason, and the commands that show its details."""
+def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Print a line for every stopped cell with its reason, and the commands that show its details."""
     if not rows:
         return
     remark(f"\nStopped: {len(rows)}.")
     for row in rows:
-        reason = cut(" ".join(str(row["reason"]).split()), _REASON_CHARACTERS)
+        reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
     which = str(rows[0]["cell"]), "--out", str(folder)
-    remark(f"Look into one:  {command_line('tactbench', 'why', *which)}")
-    remark(f"Try it again:   {command_line('tactbench', 'why', *which, '--again')}")
+    remark(f"Details of one:  {command_line('tactbench', 'why', *which)}")
+    remark(f"Compute again:   {command_line('tactbench', 'why', *which, '--again')}")

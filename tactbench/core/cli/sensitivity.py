@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.options import RESULTS, SIMULATION, format_option, options
+from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, format_option, options
 from tactbench.core.spec.bounds import MOST_REPEATS
 
 
@@ -21,7 +21,7 @@ from tactbench.core.spec.bounds import MOST_REPEATS
                  help="Nuisance; repeatable. Default: all whose range a sensor states."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N", help="Number of campaigns."),
     SIMULATION,
-    click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Parallel worker processes."),
+    JOBS,
     RESULTS,
 )  # fmt: skip
 @format_option("table", "md", "latex")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,10 +11,8 @@ from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Owned
-    from tactbench.core.spec.scene import Scene
     from tactbench.core.spec.sensor import SensorSpec
     from tactbench.core.spec.task import TaskSpec
-    from tactbench.core.tables.text_table import TextTable
 
 
 @click.command(name="show")
@@ -24,7 +21,7 @@ if TYPE_CHECKING:
               help="Show every parameter of a sensor and its source.")  # fmt: skip
 @format_option("table", "json")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (Table I and data sheets), or details of anything else that is installed."""
+    """Show sensors side by side (Table I and data sheets), or details of other things that are installed."""
     from tactbench.core.errors import UnknownNameError
     from tactbench.core.plugins.registry import load_registry, plain
 
@@ -50,17 +47,18 @@ def _owner(owned: Owned[Any]) -> str:
     return f"{owned.distribution} {owned.version} ({owned.module})"
 
 
-_HIDDEN = ("name", "scenes", "campaigns", "published", "protocols", "dimensions", "parameters")
+_HIDDEN = ("name", "scenes", "campaigns", "published", "dimensions", "parameters")
 """Fields of a descriptor that have a table of their own or are not printed; JSON has them."""
 
 
 def _page(owned: Owned[Any]) -> None:
-    """Print the fields of a descriptor, and its scenes or parameters as tables."""
+    """Print the fields of a descriptor, and its scenes or parameters as a table."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
-    from tactbench.core.leaderboard.names import lower_is_better
     from tactbench.core.spec.rig import TaskDescriptor
+    from tactbench.core.spec.row import lower_is_better
     from tactbench.core.tables.text_table import text_table
 
+    lines: list[tuple[str, ...]]
     one = owned.descriptor
     stated = one.spec if isinstance(one, TaskDescriptor) else one
     fields = [(type(one).__name__.removesuffix("Descriptor").lower(), one.name), ("brought by", _owner(owned))]
@@ -68,49 +66,37 @@ def _page(owned: Owned[Any]) -> None:
     if isinstance(one, TaskDescriptor):
         fields.append(("better", "lower" if lower_is_better(stated.metric) else "higher"))
         fields.append(("recordings", "" if stated.scenes else "made elsewhere: run --rig replay --recordings DIR"))
-        tables = [*_task_tables(stated)]
+        title, lines = "Recordings", [_OF_SCENES, *_scenes(stated)]
     else:
         parameters = getattr(one, "dimensions", getattr(one, "parameters", {}))
-        lines = [(name, f"{p.default:g}", p.unit, p.range, p.text) for name, p in parameters.items()]
-        head = ("parameter", "default", "unit", "may be", "what it is")
-        tables = [text_table(f"Given as {one.name}:NAME=VALUE,…", head, lines, numeric=("default",))] if lines else []
+        lines = [("parameter", "default", "unit", "range", "meaning")]
+        lines += [(name, f"{p.default:g}", p.unit, p.range, p.text) for name, p in parameters.items()]
+        title = f"Given as {one.name}:NAME=VALUE,…"
     print_fields([(name, text) for name, text in fields if text])
-    if tables:
-        click.echo()
-        print_tables(tables)
     click.echo()
+    if lines[1:]:
+        print_tables([text_table(title, lines[0], lines[1:], numeric=("default", "scenes", "places"))])
+        click.echo()
 
 
-def _task_tables(task: TaskSpec) -> Iterator[TextTable]:
-    from tactbench.core.evaluation.protocols import PROTOCOLS
-    from tactbench.core.tables.numbers import suffix
-    from tactbench.core.tables.text_table import text_table
+_OF_SCENES = ("role", "scenes", "indenter", "places", "force up to", "slides at", "duration")
 
-    groups: dict[tuple[str, str], list[Scene]] = {}
-    for planned in task.scenes:
-        groups.setdefault((str(planned.role), str(planned.scene.profile.duration)), []).append(planned.scene)
-    lines = []
-    for (role, duration), scenes in groups.items():
+
+def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
+    """Return a line for the scenes of each role and duration."""
+    from tactbench.core.leaderboard.names import grouped
+
+    lines: list[tuple[str, ...]] = []
+    groups = grouped(task.scenes, lambda planned: (str(planned.role), str(planned.scene.profile.duration)))
+    for (role, duration), several in groups.items():
+        scenes = [planned.scene for planned in several]
         indenters = dict.fromkeys(str(scene.indenter) for scene in scenes)
         places = {(str(scene.placement.x), str(scene.placement.s)) for scene in scenes}
         forces = dict.fromkeys(f"{scene.profile.largest_n:g}" for scene in scenes)
         slides = dict.fromkeys(str(scene.slide.speed) for scene in scenes if scene.slide)
         lines.append((role, str(len(scenes)), ", ".join(indenters), str(len(places)), f"{', '.join(forces)} N",
                       ", ".join(slides), duration))  # fmt: skip
-    if lines:
-        head = ("role", "scenes", "indenter", "places", "force up to", "slides at", "duration")
-        yield text_table("Recordings", head, lines, numeric=("scenes", "places"))
-    marks = {True: " (uses test-set statistics: †)", False: ""}
-    specs = [PROTOCOLS[name] for name in task.protocols if name in PROTOCOLS]
-    protocols = [(spec.name, spec.title + marks[spec.uses_test_statistics]) for spec in specs]
-    yield text_table("Protocols, the default first", ("protocol", "what it does"), protocols)
-    published = [
-        (f"{one.score:g}{suffix(task.unit)}", one.sensor or "any", one.estimator or "their own", one.protocol,
-         one.reference + (f" ({one.remark})" if one.remark else ""))
-        for one in task.published
-    ]  # fmt: skip
-    if published:
-        yield text_table("Published", ("score", "sensor", "estimator", "protocol", "reference"), published)
+    return lines
 
 
 def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
@@ -119,7 +105,7 @@ def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
 
     tables = {
         "Sensor comparison (Table I of Karl et al. 2016)": table_one(sensors), "Data sheet": data_sheets(sensors),
-        "Readings": readings(sensors), "Parameters": quantities(sensors) if everything else [],
+        "Readings": readings(sensors), "Parameters": quantities(sensors) if everything else {},
     }  # fmt: skip
     shown = [sensor_table(title, sensors, rows, with_source=everything) for title, rows in tables.items() if rows]
     print_tables(shown)

@@ -1,28 +1,25 @@
-"""``tactbench why``: what a score rests on, whether it would be reused, how a cell ended, and the same once more."""
+"""``tactbench why``: what a score rests on, how a cell ended, whether it would be reused; its recomputation."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.tables.text import command_line, json_text, visible_lines
+from tactbench.core.tables.text import command_line, cut, json_text, visible_lines
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Row
     from tactbench.core.matrix.why import StoredCell
 
-Field = tuple[str, str]
-"""A name, and a text of the value with its unit."""
-_TAIL = 15
-"""Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
-_FIELDS = 12
-"""Fields of one kind (recordings, reasons) that are shown; the others stand in ``--format json``."""
+_LINES = 15
+"""Lines of a traceback, log or table that are shown; JSON has all of them."""
+_LONGEST = 400
+"""Characters of a value that are shown."""
 
 
 @click.command(name="why")
@@ -34,9 +31,9 @@ _FIELDS = 12
 def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -> None:
     """Show what a cell's score rests on, whether its result would be reused, and how it ended.
 
-    CELL is a name as tables show it, or a part of it that only one cell has; of its replicates the first is meant. With
-    --again, the exit code is 1 if something differs or it fails. What a simulation recorded is then recorded again,
-    into another place.
+    CELL is a name as tables show it, or a part of it that only one cell has. Reuse and --again are of the first of its
+    replicates. With --again, simulated recordings are made anew in a temporary folder, and the exit code is 1 if a
+    result differs or the cell fails.
     """
     from tactbench.core.matrix.why import stored_cell
     from tactbench.core.study.results import opened
@@ -46,105 +43,45 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
     if shape == "json":
         click.echo(json_text(facts, indent=1))
     else:
-        (_print_again if again else _print)(facts)
+        (_print_again if again else _print)(facts, found)
     ctx.exit(1 if again and facts["answer"] != "identical" else 0)
 
 
 def _facts(found: StoredCell) -> dict[str, Any]:
-    row, name = found.row, found.cell.name
-    key, reasons = found.changes()
+    """Return the row of the first replicate, and whether a run would reuse it."""
+    from tactbench.core.report.cells import recording_scores
+
+    row = found.row
+    _, reasons = found.changes()
     done = row["status"] == "done"
     return {
-        "cell": name,
-        "answer": "hit" if done and not reasons else "miss",
-        "key": key,
-        "reasons": reasons,
-        **{fact: row.get(fact) for fact in ("status", "reason", "signal", "traceback", "log")},
-        "file": str(found.store.folder / "cells" / f"{row['key']}.h5") if done else None,
-        "recordings": list(row["recordings"]) if done else [],
-        "simulation": row["simulation"],
-        "replicates": [*_replicates(found)] if done else [],
-        "rests_on": [*_rests_on(row)] if done else [],
-        "left_out": row["counts"],
-        "recording_scores": _recording_scores(found) if done else {},
-        "try": command_line("tactbench", "why", name, "--again", "--out", str(found.store.folder)),
-    }
+        **row, "cell": found.cell.name, "answer": "hit" if done and not reasons else "miss", "reasons": reasons,
+        "file": str(found.store.file_of(row)),
+        "recording_scores": recording_scores(row, found.store.answers(str(row["key"])).get("test")),
+        "try": command_line("tactbench", "why", found.cell.name, "--again", "--out", str(found.store.folder)),
+    }  # fmt: skip
 
 
-def _replicates(found: StoredCell) -> Iterator[Field]:
-    """Yield the scores and times of the cell over its replicates, and the score of each of them."""
-    from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.statistics.replicates import counted, over_replicates, percent
-    from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
+def _print(facts: dict[str, Any], found: StoredCell) -> None:
+    """Print the facts, and the details of the cell over all replicates as the report has them."""
+    from tactbench.core.cli.grid import print_fields, print_tables
+    from tactbench.core.report.cells import details
+    from tactbench.core.statistics.replicates import over_replicates
 
     name = found.cell.name.removesuffix(f"/{found.cell.seed}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
-    unit, many, of = str(row["unit"]), row["n_replicates"], str(row["replicate_unit"])
-    yield metric_name(row), f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"
-    if row["ci_low"] is not None:
-        ends = interval(row["ci_low"], row["ci_high"], unit)
-        yield f"{percent(many, of)} interval", f"{ends} {row['ci_method']}"
-    for name in ("score_beyond_floor", "reference_floor", "reference_floor_se", "reference_score", "published"):
-        if row.get(name) is not None:
-            yield name.replace("_", " "), score_with_unit(row[name], unit)
-    kept = found.row["replicates"]
-    own = zip(kept["names"], kept["own"], strict=True) if of != "replicate" else ()
-    for label, value in own or zip((f"seed {seed}" for seed in row["seeds"]), row["replicate_scores"], strict=True):
-        yield f"score, {label}" if of == "replicate" else f"score, {of} {label}", score_with_unit(value, unit)
-    if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
-        yield "delay after touch", delay(row["answer_delay_ms"], row["delay_parts_ms"])
-        yield from ((f"  {part}", duration(value / 1e3)) for part, value in row["delay_parts_ms"].items())
-
-
-def _rests_on(row: Row) -> Iterator[Field]:
-    """Yield the metrics, samples, recordings and assumptions behind the score of a finished replicate."""
-    from tactbench.core.cli.grid import field_text
-    from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.tables.numbers import score_with_unit
-
-    yield metric_name(row), score_with_unit(row["score"], str(row["unit"]))
-    yield from ((name, f"{value:.3g}") for name, value in {**row["scores"], **(row.get("events") or {})}.items())
-    if row.get("chosen"):
-        yield "chosen on validation data", field_text(row["chosen"])
-    yield "samples to train on, all folds together", str(row["n_train"])
-    yield "samples to test on", str(row["n_test"])
-    yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
-    yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))
-    yield from (("found", str(text)) for text in row.get("findings", ()))
-    yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
-
-
-def _recording_scores(found: StoredCell) -> dict[str, float]:
-    """Return the score of each test recording, of classes the accuracy; none of events."""
-    from tactbench.core.report.cells import recording_scores
-
-    scores = recording_scores(found.row, found.store.answers(str(found.row["key"])).get("test"))
-    return {name: value for name, _, value in map(dict.values, scores)}
-
-
-def _print(facts: Mapping[str, Any]) -> None:
-    from tactbench.core.cli.grid import print_fields
-
-    kept = "reuses it" if facts["answer"] == "hit" else "computes it again"
-    scores = [f"{value:.4g} of {name}" for name, value in facts["recording_scores"].items()]
-    counts = sorted(facts["left_out"].items(), key=lambda one: -one[1])
-    several = {
-        "changed": facts["reasons"], "left out": [f"{count} {what}" for what, count in counts],
-        "test recordings": scores, "recordings": facts["recordings"],
-    }  # fmt: skip
-    fields = [("cell", facts["cell"]), ("status", str(facts["status"])), ("reason", str(facts["reason"] or ""))]
-    fields += [("signal", str(facts["signal"] or "")), ("tactbench run", kept), *facts["replicates"]]
-    if facts["rests_on"]:
-        fields += [("this replicate", facts["file"]), *((f"  {name}", value) for name, value in facts["rests_on"])]
-    for name, texts in several.items():
-        more = [f"… {len(texts) - _FIELDS} more"] if len(texts) > _FIELDS else []
-        labels = [f"{name} ({len(texts)})", *[""] * _FIELDS]
-        fields += zip(labels, [*texts[:_FIELDS], *more], strict=False)
-    print_fields([(name, value) for name, value in fields if value])
-    for part in ("traceback", "log"):
-        lines = (facts[part] or "").splitlines()
-        if lines:
-            click.echo(visible_lines("\n  ".join([f"{part}, last lines:", *lines[-_TAIL:]])))
+    known = details(row, found.store.answers(str(row["key"])).get("test"))
+    reuse = "reuses it" if facts["answer"] == "hit" else "computes it again"
+    fields = [("cell", facts["cell"]), ("tactbench run", reuse), *(("changed", text) for text in facts["reasons"])]
+    print_fields([*fields, ("file", facts["file"])])
+    for title, pairs in known.pairs.items():
+        click.secho(f"\n{title}", bold=True)
+        print_fields([(key, cut(text.replace("\n", "; "), _LONGEST)) for key, text in pairs.items()])
+    for table in known.tables:
+        click.echo()
+        print_tables([replace(table, lines=table.lines[:_LINES], kinds=table.kinds[:_LINES])])
+    for title, text in known.texts.items():
+        click.echo(visible_lines("\n  ".join([f"\n{title}, last lines:", *text.splitlines()[-_LINES:]])))
     click.echo(visible_lines(f"\nTry: {facts['try']}"))
 
 
@@ -164,7 +101,7 @@ def _again(found: StoredCell) -> dict[str, Any]:
     }
 
 
-def _print_again(facts: Mapping[str, Any]) -> None:
+def _print_again(facts: dict[str, Any], _: StoredCell) -> None:
     from tactbench.core.cli.grid import print_fields
 
     fields = [("cell", facts["cell"]), ("answers, scores, intervals", facts["answer"]), ("status", facts["status"])]

@@ -1,15 +1,17 @@
-"""Varies one setting after another and measures scores and times; each setting is an ordinary cell of the matrix."""
+"""Varies one setting after another and measures scores and times; each setting is a cell of the matrix."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from tactbench.core.cost.precision import front
+from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, shots
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import Registry
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor
@@ -62,6 +64,24 @@ class Setting(NamedTuple):
         return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
 
 
+def quick_estimator(registry: Registry, task: str) -> str:
+    """Return the name of a linear estimator for `task` that searches no parameters, the task's own before others.
+
+    Where there is none, the first of these estimators.
+
+    Raises
+    ------
+    UsageError
+        If no estimator for this kind of question is installed, trivial ones aside.
+    """
+    spec = registry.tasks[task].spec
+    fitting = [registry.estimators[name] for name in spec.estimators]
+    fitting += [one for one in registry.estimators if spec.kind in one.kinds and not one.baseline]
+    if not fitting:
+        raise UsageError(f"No estimator for task {task!r} is installed.", hint="See `tactbench list estimators`.")
+    return next((one.name for one in fitting if one.linear and not one.grid), fitting[0].name)
+
+
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
     """Yield the settings of the first of `estimators`, and all of them with their defaults."""
     first = estimators[0]
@@ -94,62 +114,45 @@ def simulations_of(rig: RigDescriptor, estimator: EstimatorDescriptor, protocol:
 
 
 def measure(
-    matrix: MatrixSpec, settings: Sequence[Setting], folder: Path, *, repeats: int, choice: EngineChoice | None = None,
+    matrix: MatrixSpec, settings: Sequence[Setting], folder: Path, *, choice: EngineChoice | None = None,
     recordings: Path | None = None, progress: Progress,
-) -> Iterator[dict[str, Any]]:  # fmt: skip
-    """Yield the results so far, after each knob of the first replicate and after each further replicate.
+) -> dict[str, Any]:  # fmt: skip
+    """Answer every setting as cells of a result folder and return their scores and times.
 
     Parameters
     ----------
     matrix
-        Rig, first seed, one sensor and one task.
+        Rig, first seed, number of replicates, one sensor and one task.
     folder
-        Of the results; each simulation other than the usual one has a folder of its own in it. What is there already is
-        reused.
-    repeats
-        Replicates; times are of the first.
+        Result folder; each simulation other than the default one has its own folder in it. Finished cells are reused.
 
-    Yields
-    ------
+    Returns
+    -------
     dict
-        ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``trivial`` (the score of the
-        best answer that looks at nothing, or None), ``replicates``, and ``settings``: a record for each setting that
-        has ended so far, in the order of `settings`.
+        ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``dagger``, ``seed``,
+        ``trivial`` (the score of the best answer that looks at nothing, or None), ``replicates``, and ``settings``: a
+        record for each setting, in the order of `settings`.
     """
     task = matrix.tasks[0].name
-    rows: dict[Simulation, dict[str, Row]] = {}
-    for replicate in range(repeats):
-        pieces: dict[tuple[Simulation, str], list[Setting]] = {}
-        for one in settings:
-            pieces.setdefault((one.simulation, "" if replicate else one.knob), []).append(one)
-        for (simulation, _), piece in pieces.items():
-            own = folder
-            if simulation != Simulation():
-                own = folder / "-".join((piece[0].knob, piece[0].value))
-            change = {
-                "seed": matrix.seed + replicate, "repeats": 1, "latency": replicate == 0, "simulation": simulation,
-                "tasks": tuple(one.choice.model_copy(update={"name": task}) for one in piece),
-            }  # fmt: skip
-            outcome = run_matrix(
-                matrix.model_copy(update=change), Store(own), choice=choice, recordings=recordings, progress=progress
-            )
-            rows.setdefault(simulation, {}).update((row["cell"], row) for row in outcome.rows)
-            yield _known(settings, rows, matrix.seed)
-
-
-def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, Row]], seed: int) -> dict[str, Any]:
-    answers = {simulation: over_replicates(list(own.values())) for simulation, own in rows.items()}
-    records: list[Record] = []
-    for one in settings:
-        for row in answers.get(one.simulation, ()):
-            if one.is_of(row):
-                kept = {key: row[key] for key in _KEPT}
-                records.append({"knob": one.knob, "value": one.value, **kept, "front": False})
-    every = [row for own in answers.values() for row in own]
-    first = next((row for row in every if row["status"] == "done"), every[0])
+    answers: dict[Simulation, list[Row]] = {}
+    for simulation in dict.fromkeys(one.simulation for one in settings):
+        own = [one for one in settings if one.simulation == simulation]
+        tasks = tuple(one.choice.model_copy(update={"name": task}) for one in own)
+        store = Store(folder if simulation == Simulation() else folder / f"{own[0].knob}-{own[0].value}")
+        part = matrix.model_copy(update={"simulation": simulation, "tasks": tasks})
+        outcome = run_matrix(part, store, choice=choice, recordings=recordings, progress=progress)
+        answers[simulation] = over_replicates(outcome.rows)
+    records: list[Record] = [
+        {"knob": one.knob, "value": one.value, **{key: row[key] for key in _KEPT}, "front": False}
+        for one in settings
+        for row in answers[one.simulation]
+        if one.is_of(row)
+    ]
+    rows = [row for own in answers.values() for row in own]
+    first = next((row for row in rows if row["status"] == "done"), rows[0])
     sign = 1.0 if lower_is_better(first["metric"]) else -1.0
     trivial: list[float] = [
-        row["score"] for row in every
+        row["score"] for row in rows
         if (row["is_baseline"], row["protocol"], row["split"]) == (True, first["protocol"], first["split"])
         and row["looks_at"] == "nothing" and row["status"] == "done"
     ]  # fmt: skip
@@ -159,8 +162,7 @@ def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, R
         if one["knob"] in BOUGHT and one["status"] == "done" and one["answer_delay_ms"] is not None
         and (bar is None or sign * one["score"] < sign * bar)
     ]  # fmt: skip
-    for best in front(competing, seconds=lambda one: one["answer_delay_ms"], error=lambda one: sign * one["score"]):
+    for best in front(competing, lambda one: (one["answer_delay_ms"], sign * one["score"])):
         best["front"] = True
     about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
-    return {**about, "seed": seed, "trivial": bar,
-            "replicates": max(row["repeats"] for row in every), "settings": records}  # fmt: skip
+    return {**about, "seed": matrix.seed, "trivial": bar, "replicates": matrix.repeats, "settings": records}

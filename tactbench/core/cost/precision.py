@@ -15,19 +15,17 @@ SHARE = 1 / 3
 """Share of an observable's noise; a smaller error changes scores little."""
 
 
-def front(points: Sequence[P], *, seconds: Callable[[P], float], error: Callable[[P], float]) -> list[P]:
-    """Return the points that no other one beats in both, the quickest first.
+def front(points: Sequence[P], cost_of: Callable[[P], tuple[float, float]]) -> list[P]:
+    """Return the points that no other point beats in both time and error, in order of time.
 
     Parameters
     ----------
-    seconds
-        What one takes; any unit, smaller is better.
-    error
-        How far off one is; smaller is better. A score to be maximised is given with its sign changed.
+    cost_of
+        Function that returns the time and the error of a point, both the smaller the better.
     """
     kept: list[P] = []
-    for point in sorted(points, key=lambda point: (seconds(point), error(point))):
-        if not kept or error(point) < error(kept[-1]):
+    for point in sorted(points, key=cost_of):
+        if not kept or cost_of(point)[1] < cost_of(kept[-1])[1]:
             kept.append(point)
     return kept
 
@@ -38,12 +36,12 @@ class Skipped(NamedTuple):
     subject: str
     label: str
     rung: str
-    """Name of the rung that it is; empty: none."""
+    """Name of the rung; empty: none."""
     reason: str
 
 
 def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[CostPoint | Skipped]:
-    """Carry out the jobs of a study; yield its points, and the reasons of jobs that are not possible."""
+    """Carry out the jobs of a study; yield their points, and the reasons of jobs that are not possible."""
     progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)
@@ -55,7 +53,7 @@ def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[Cos
 
 
 def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoint]]:
-    """Return the points by (subject, observable), each diagram's in order of their time."""
+    """Return the points by (subject, observable), those of each diagram in order of their time."""
     found: dict[tuple[str, str], list[CostPoint]] = {}
     for point in points:
         found.setdefault((point.subject, point.observable), []).append(point)
@@ -64,10 +62,10 @@ def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoin
 
 def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
     """Return the front of one diagram: error against seconds."""
-    return front(points, seconds=lambda point: point.seconds, error=lambda point: point.error)
+    return front(points, lambda point: (point.seconds, point.error))
 
 
 def quickest_enough(points: Sequence[CostPoint]) -> CostPoint | None:
-    """Return the quickest point of one diagram below a third of its noise; None: none, or no noise is stated."""
+    """Return the quickest point whose error is below a third of the noise; None: no such point, or no noise stated."""
     enough = [point for point in points if math.isfinite(point.floor) and point.error < SHARE * point.floor]
     return min(enough, key=lambda point: point.seconds, default=None)

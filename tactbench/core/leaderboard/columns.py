@@ -1,4 +1,4 @@
-"""The columns of a leaderboard, and a row as the texts that stand in them."""
+"""The columns of a leaderboard, and the texts of a row in them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.row import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
-from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, whole
+from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, whole
 from tactbench.core.tables.text import visible
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
@@ -40,30 +39,29 @@ def _interval(shown: str, low: str, high: str) -> Column:
     return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), middle)
 
 
-def _time(shown: str, key: str, per_second: float = 1.0) -> Column:
-    def seconds(row: Row) -> float | None:
-        return None if row.get(key) is None else row[key] / per_second
+def _time(shown: str, key: str) -> Column:
+    return Column(shown, lambda row: duration(_seconds(row, key)), lambda row: _seconds(row, key))
 
-    return Column(shown, lambda row: duration(seconds(row)), seconds)
+
+def _seconds(row: Row, key: str) -> float | None:
+    return None if row.get(key) is None else row[key] / (1e3 if "_ms" in key else 1.0)
 
 
 def _range(row: Row) -> str:
-    """Return the lowest and highest score of campaigns; without an interval, the scores of the units held out."""
+    """Return the scores of campaigns, or of the units held out, if they are too few for an interval."""
     scores, unit = row.get("replicate_scores") or [], row["unit"]
-    if len(scores) < 2 or (held_out(row) and row["ci_low"] is not None):
+    if len(scores) < 2 or row["ci_low"] is not None:
         return ABSENT
-    several = f"{coarse(row['score_min'], unit)} … {coarse(row['score_max'], unit)}"
-    if not held_out(row):
-        return several
     each = ", ".join(score(one, unit) for one in scores)
-    return visible(f"{each if len(scores) < FEWEST else several} by {row['replicate_unit']}")
+    several = f"{score(row['score_min'], unit)} … {score(row['score_max'], unit)}"
+    shown = each if len(scores) < FEWEST else several
+    return visible(f"{shown} by {row['replicate_unit']}" if held_out(row) else shown)
 
 
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
 """Columns whose text depends on the other rows of the block."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
-    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT))),
     "estimator": Column("estimator", answer_name),
     "score": _score("score", "score"),
     "interval": _interval("interval", "ci_low", "ci_high"),
@@ -76,14 +74,14 @@ OF_ROWS: dict[str, Column] = {
     "delay after touch": Column(
         "answer_delay",
         lambda row: delay(row.get("answer_delay_ms"), row.get("delay_parts_ms")),
-        lambda row: None if row.get("answer_delay_ms") is None else row["answer_delay_ms"] / 1e3,
+        lambda row: _seconds(row, "answer_delay_ms"),
     ),
     "training": _time("fit", "fit_s"),
     "simulation": _time("sim", "sim_s"),
-    "latency p50": _time("latency_p50", "latency_ms_p50", 1e3),
-    "latency p95": _time("latency_p95", "latency_ms_p95", 1e3),
+    "latency p50": _time("latency_p50", "latency_ms_p50"),
+    "latency p95": _time("latency_p95", "latency_ms_p95"),
 }
-COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
+COLUMNS = ("place", "sensor", "estimator", "score", "notes", *list(OF_ROWS)[3:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
 WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "latency p95")
 """Columns that are printed only with all others."""
@@ -108,20 +106,20 @@ class Line:
         if column == "place":
             return self.placing.place if self.placing else None
         sorted_by = OF_ROWS[column].value if column in OF_ROWS else None
-        # A stopped cell may know a number that the table does not show.
+        # The row of a stopped cell may have a number that the table does not show.
         return sorted_by(self.row) if sorted_by and self.kind in ("result", "baseline") else None
 
 
-def line_of(row: Row, placing: Rank | None, marks: Sequence[str], place: str = "") -> Line:
-    """Return the line of a row; `place` is shown if the row has no rank."""
+def line_of(row: Row, placing: Rank | None = None, marks: Sequence[str] = (), place: str = "") -> Line:
+    """Return the line of a row; `place` is shown if a finished row has no rank."""
+    texts = dict.fromkeys(COLUMNS, "")
     if row["status"] != "done":
-        texts = {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
-        kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
-        return Line(row, {name: texts.get(name, "") for name in COLUMNS}, kind)
+        texts |= {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
+        return Line(row, texts, "failed" if row["status"] in STOPPED else "skipped")
+    # An absent value is empty: the dash means that an answer has no place.
+    texts |= {name: text for name, column in OF_ROWS.items() if (text := column.text(row)) != ABSENT}
     if placing:
         place = f"{placing.place}=" if placing.unsure else str(placing.place)
-    ranked = {"place": place, "notes": " ".join(marks)}
-    texts = {name: ranked[name] if name in ranked else OF_ROWS[name].text(row) for name in COLUMNS}
-    # An absent value is empty: the dash means one thing, that an answer has no place.
-    texts = {name: "" if text == ABSENT and name != "place" else text for name, text in texts.items()}
-    return Line(row, texts, "baseline" if row["is_baseline"] else "result", placing)
+    return Line(
+        row, texts | {"place": place, "notes": " ".join(marks)}, "baseline" if row["is_baseline"] else "result", placing
+    )

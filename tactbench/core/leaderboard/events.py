@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from tactbench.core.leaderboard.names import Row, answer_name
 from tactbench.core.tables.numbers import ABSENT
@@ -23,38 +23,37 @@ _FIGURES = {
 }
 """Key of the figure and format of each column."""
 _NOTE = (
-    "Latency: from the labelled onset to the alarm, with the time that the detector computes; negative is early; over "
-    "hits alone. Slipped: the median displacement from onset to alarm. Compute: seconds a second of signal."
+    "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
+    "Slipped: the median displacement from onset to alarm. Compute: seconds a second of signal."
 )
 
 
 def events_table(rows: Sequence[Row]) -> TextTable | None:
     """Return the table of finished rows with figures of events; None if there is no such row."""
     finished = [row for row in rows if row["status"] == "done" and row.get("events")]
+    if not finished:
+        return None
     lines = []
     for row in finished:
         figures = row["events"]
-        texts = {name: _figure(figures, key, form) for name, (key, form) in _FIGURES.items()}
+        texts = {name: ABSENT if figures.get(key) is None else f"{figures[key]:{form}}"
+                 for name, (key, form) in _FIGURES.items()}  # fmt: skip
         if "misses" in figures:
             texts["misses"] += f" of {figures['events']:g}"
         if figures.get("alarms") == 0:
             texts["latency p50 [ms]"] = "never alarms"
         lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
-    if not lines:
-        return None
     bound, area = (
         " or ".join(dict.fromkeys(f"{row['events'][key]:g}" for row in finished if key in row["events"]))
         for key in ("bound of false alarms per minute", "area up to false alarms per minute")
     )
-    title = "Events, at the threshold that validation recordings chose" + (
-        f" for at most {bound} false alarm{'s' * (bound != '1')} a minute" if bound else ""
-    )
+    limit = f" for at most {bound} false alarm{'s' * (bound != '1')} a minute" if bound else ""
     notes = (f"Recall area: recall, averaged over false alarms a minute from 0 to {area}. {_NOTE}" if area else _NOTE,)
-    kinds = tuple("baseline" if row["is_baseline"] else "result" for row in finished)
-    columns = ("task", "sensor", "estimator", *_FIGURES)
-    return TextTable(title, columns, tuple(lines), frozenset(_FIGURES), kinds=kinds, notes=notes)
-
-
-def _figure(figures: Mapping[str, float | None], key: str, form: str) -> str:
-    value = figures.get(key)
-    return ABSENT if value is None else f"{value:{form}}"
+    return TextTable(
+        f"Events, at the threshold that validation recordings chose{limit}",
+        ("task", "sensor", "estimator", *_FIGURES),
+        tuple(lines),
+        frozenset(_FIGURES),
+        kinds=tuple("baseline" if row["is_baseline"] else "result" for row in finished),
+        notes=notes,
+    )

@@ -1,7 +1,8 @@
-"""The leaderboard in the formats that people, papers, pages and programs read; each shows the same digits."""
+"""The leaderboard in every format; all show the same digits."""
 
 from __future__ import annotations
 
+import importlib
 import io
 import math
 from collections.abc import Iterator, Sequence
@@ -9,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
@@ -17,7 +17,6 @@ from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
-from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
 from tactbench.core.tables.csv_text import csv_text
@@ -31,8 +30,6 @@ SUFFIXES = {
     ".txt": "table",
 }  # fmt: skip
 """Format of a file by its suffix."""
-IN_FOLDER = ("md", "csv", "json")
-"""A run's result folder has these, ``leaderboard.md`` and so on; `tactbench leaderboard` writes the others."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "against reference", "published")
 _LONG = 12
 """Largest number of characters of a name that its column in a paper does not break."""
@@ -60,13 +57,11 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
-    """Return a block as LaTeX; it has no commands, and no places unless they are among `names`."""
-    # Cells without a score stand above the rule: trivial answers alone are below it.
+    """Return a block as LaTeX with the columns `names`, trivial answers below a rule."""
     order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
     lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
-    left_out = {"notes"} | ({"range"} if names == _IN_A_PAPER and "interval" in grid.columns else set())
-    names = [name for name in names if name in grid.columns and name not in left_out]
+    names = [name for name in names if name in grid.columns and name != "notes"]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
     heads = {
         name: head.replace(" over ", "\nover ") if " over " in head else "\n".join(head.rsplit(" ", 1))
@@ -94,22 +89,12 @@ def _column(name: str, texts: Sequence[str]) -> str:
 
 
 def _caption(block: Block) -> str:
-    """Return the title of a block, its setting, where it comes from, and how many samples and what intervals are of."""
+    """Return the title of a block, its setting, its origin, and the number of test samples."""
     rows = [line.row for line in block.lines if line.kind == "result"]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
-    over = {
-        (int(row["n_replicates"]), visible(str(row["replicate_unit"])))
-        for row in rows
-        if row["ci_low"] is not None and row.get("n_replicates")
-    }
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
-    if len(over) == 1:
-        number, unit = over.pop()
-        campaigns = unit == "replicate"  # a campaign has a score of its own
-        what = "Scores are medians, intervals" if campaigns else "Intervals are"
-        sentences.append(f"{what} over {counted(number, 'campaign' if campaigns else unit)}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)
@@ -121,26 +106,25 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     Parameters
     ----------
     view, width
-        What is printed of it for people, and how wide a terminal is; the formats for programs hold everything.
+        Printed columns, and the width of a terminal; the formats for programs hold everything.
 
     Raises
     ------
     UsageError
         If the library of Parquet or Excel is not installed.
     """
-    if shape == "table":
-        return plain_text(table, width, view).encode("utf-8", "backslashreplace")
     if shape in ("parquet", "xlsx"):
         return parquet(table) if shape == "parquet" else xlsx(table)
-    if shape in ("md", "latex"):
-        text = markdown(table, view) if shape == "md" else latex(table, view)
-    else:
-        text = csv_text(*flat_records(table)) if shape == "csv" else json_array(table)
-    return text.encode("utf-8", "replace")
+    text = {
+        "table": lambda: plain_text(table, width, view), "md": lambda: markdown(table, view),
+        "latex": lambda: latex(table, view), "csv": lambda: csv_text(*flat_records(table)),
+        "json": lambda: json_array(table),
+    }[shape]()  # fmt: skip
+    return text.encode("utf-8", "backslashreplace" if shape == "table" else "replace")
 
 
 def write_tables(table: Table, folder: Path) -> None:
-    """Write a leaderboard into a result folder.
+    """Write ``leaderboard.md``, ``.csv`` and ``.json`` into a result folder.
 
     Raises
     ------
@@ -148,7 +132,7 @@ def write_tables(table: Table, folder: Path) -> None:
         If the folder cannot be written; each of the files is then whole, an old one or a new one.
     """
     try:
-        for shape in IN_FOLDER:
+        for shape in ("md", "csv", "json"):
             replace_file(folder / f"leaderboard.{shape}", rendered(table, shape))
     except OSError as error:
         raise UsageError(
@@ -157,27 +141,24 @@ def write_tables(table: Table, folder: Path) -> None:
         ) from error
 
 
-RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
-"""Keys of the rank of a row in its block; they follow the keys of the row."""
-
-FORMAT_VERSION = "1"
+_RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
+"""Keys of the rank of a row in its block, and their types."""
 _KEYS = (*JSON_KEYS, *OF_REPLICATES)
 """Keys of a table's records, before their ranks."""
-_RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
-    """Yield each line's row, ranks among it, and its texts by what their columns are called for programs."""
+    """Yield the row of each line with its ranks, and the texts of its columns by their names for programs."""
     for line in table.lines:
         one = line.placing
         ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
-        row = {key: line.row.get(key) for key in _KEYS} | dict(zip(RANK_KEYS, ranks, strict=True))
+        row = {key: line.row.get(key) for key in _KEYS} | dict(zip(_RANKS, ranks, strict=True))
         yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
 def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
     """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
-    names = [*_KEYS, *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
+    names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
     return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
 
 
@@ -194,26 +175,17 @@ def json_array(table: Table) -> str:
 
 
 def parquet(table: Table) -> bytes:
-    """Return a table's records as a Parquet file: lists and tables as JSON text, versions and provenance as metadata.
+    """Return a table's records as a Parquet file: lists and tables as JSON text, provenance as metadata.
 
     Raises
     ------
     UsageError
         If pyarrow is not installed.
     """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise _lacking("Parquet", "pyarrow", "parquet", error) from error
+    pa, pq = (_library(name, "Parquet", "parquet") for name in ("pyarrow", "pyarrow.parquet"))
     types = {bool: pa.bool_(), float: pa.float64(), int: pa.int64(), str: pa.string()}
     names, lines = flat_records(table)
-    metadata = {
-        "tactbench.format": "tactbench-leaderboard",
-        "tactbench.format_version": FORMAT_VERSION,
-        "tactbench.version": tactbench.__version__,
-        "tactbench.provenance": json_text(list(table.provenance), sort_keys=True),
-    }
+    metadata = {"tactbench.provenance": json_text(list(table.provenance), sort_keys=True)}
     schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
     columns = zip(*lines, strict=True) if lines else [()] * len(names)
@@ -221,11 +193,14 @@ def parquet(table: Table) -> bytes:
     return out.getvalue()
 
 
-def _lacking(what: str, library: str, extra: str, error: ImportError) -> UsageError:
-    return UsageError(
-        f"{what} needs {library}, which cannot be imported: {error}.",
-        hint=f"Install it with `pip install 'tactbench[{extra}]'`.",
-    )
+def _library(name: str, what: str, extra: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise UsageError(
+            f"{what} needs {name}, which cannot be imported: {error}.",
+            hint=f"Install it with `pip install 'tactbench[{extra}]'`.",
+        ) from error
 
 
 def _kind(name: str) -> type:
@@ -242,11 +217,7 @@ def xlsx(table: Table) -> bytes:
     UsageError
         If openpyxl is not installed.
     """
-    try:
-        from openpyxl import Workbook
-    except ImportError as error:
-        raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
-    book = Workbook(write_only=True)
+    book = _library("openpyxl", "An Excel file", "xlsx").Workbook(write_only=True)
     names, lines = flat_records(table)
     notes = [one for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
     sheets = {"leaderboard": [names, *lines], "notes": [[one] for one in (*notes, *table.notes, *table.footer)]}

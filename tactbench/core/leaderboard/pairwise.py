@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
@@ -18,7 +19,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n", "verdict",
+    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "n", "verdict",
 )  # fmt: skip
 _NAMES: dict[Kind, Callable[[Row], str]] = {
     "sensors": lambda row: str(row["sensor"]),
@@ -30,7 +31,7 @@ _NAMES: dict[Kind, Callable[[Row], str]] = {
 
 @dataclass(frozen=True)
 class PairwiseComparison:
-    """Two cells that ask the same question, or why they are not compared."""
+    """Two cells that ask the same question, or the reason why they are not compared."""
 
     kind: Kind
     first: str
@@ -38,7 +39,7 @@ class PairwiseComparison:
     second: str
     first_row: Row | None
     second_row: Row | None
-    refused: str
+    refused: str = ""
     """Reason why there is no difference; empty if there is one."""
     difference: Difference | None = None
     folds: FoldDifference | None = None
@@ -68,7 +69,7 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
     Raises
     ------
     UnknownNameError
-        If these rows have no such task, nothing of such a name, or not both names are of one kind.
+        If these rows have no such task or name, or the two names are of different kinds.
     """
     rows = _in_task(rows, task)
     known = {kind: grouped(rows if kind == "estimators" else _answers(rows), name) for kind, name in _NAMES.items()}
@@ -84,7 +85,7 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
 def folder_comparisons(
     first_rows: Iterable[Row], second_rows: Iterable[Row], first: str, second: str, task: str | None = None
 ) -> list[PairwiseComparison]:
-    """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
+    """Compare the same cells of two result folders; raises UnknownNameError for a task that one of them lacks."""
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
 
 
@@ -104,47 +105,36 @@ def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
 def with_declared(
     found: Sequence[PairwiseComparison], rows: Sequence[Row], declared: Iterable[ComparisonChoice]
 ) -> list[PairwiseComparison]:
-    """Return comparisons with p-values corrected for all comparisons that were declared, whichever of them are shown.
+    """Return comparisons with p-values corrected for all that were declared, whichever of them are shown.
 
     The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
     """
-    every = [pair for choice in declared for pair in _declared(rows, choice)]
-    family = {pair.cells: pair.difference.p for pair in reversed(every) if pair.difference is not None}
+    family: dict[frozenset[str], float | None] = {}
+    for choice in declared:
+        pair = choice.sensors or choice.estimators
+        assert pair is not None, "a comparison is of two"
+        with suppress(UnknownNameError):  # the rows have one of them only
+            for one in comparisons(rows, *pair, choice.task):
+                if one.difference is not None and one.kind == ("sensors" if choice.sensors else "estimators"):
+                    family.setdefault(one.cells, one.difference.p)
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
     return [replace(pair, p_corrected=corrected.get(pair.cells)) for pair in found]
-
-
-def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
-    pair = choice.sensors or choice.estimators
-    assert pair is not None, "a comparison is of two"
-    try:
-        found = comparisons(rows, *pair, choice.task)
-    except UnknownNameError:
-        return []  # this run had one of them only
-    return [pair for pair in found if pair.kind == ("sensors" if choice.sensors else "estimators")]
 
 
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
 ) -> list[PairwiseComparison]:
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
-    found = []
-    for key in dict.fromkeys([*ones, *others]):
-        alone = (
-            ""
-            if key in ones and key in others
-            else f"{second if key in ones else first} has no such cell on this rig, protocol and split"
-        )
-        found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
-    return found
+    return [_pair(kind, first, second, ones.get(key), others.get(key)) for key in dict.fromkeys([*ones, *others])]
 
 
-def _pair(
-    kind: Kind, first: str, second: str, one: Row | None, other: Row | None, refused: str = ""
-) -> PairwiseComparison:
-    for name, row in ((first, one), (second, other)):
-        if row is not None and row["status"] != "done":
-            refused = refused or f"{name} {row['status']}: {row['reason']}"
+def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | None) -> PairwiseComparison:
+    refused = ""
+    for name, row in ((second, other), (first, one)):
+        if row is None:
+            refused = f"{name} has no such cell on this rig, protocol and split"
+        elif row["status"] != "done":
+            refused = f"{name} {row['status']}: {row['reason']}"
     if one is None or other is None or refused:
         return PairwiseComparison(kind, first, second, one, other, refused)
     if (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
@@ -181,14 +171,14 @@ def _title(pair: PairwiseComparison) -> str:
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:
-    unit = pair.row["unit"]
+    unit, found = pair.row["unit"], pair.difference
     scores = [
         Entry(score(row["score"], unit), finite(row["score"]), cell=row["cell"]) if row else ABSENT
         for row in (pair.first_row, pair.second_row)
     ]
-    found = pair.difference
     if found is None:
         return (pair.of, *scores, *(ABSENT for _ in COLUMNS[4:]), f"not compared: {pair.refused}")
+    verdict = {"better": f"{pair.first} better", "worse": f"{pair.second} better"}.get(found.verdict, found.verdict)
     return (
         pair.of,
         *scores,
@@ -197,25 +187,14 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         _probability(found.p),
         _probability(pair.folds.p) if pair.folds else ABSENT,
         "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
-        ABSENT if found.effect is None else signed(found.effect, "1"),
-        ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
-        _verdict(pair, found),
+        verdict,
     )
 
 
-def _verdict(pair: PairwiseComparison, found: Difference) -> str:
-    """Return which of the two is better, or that none is shown to be."""
-    if found.verdict in ("equivalent", "undecided"):
-        return found.verdict
-    return f"{pair.first if found.verdict == 'better' else pair.second} better"
-
-
 def _probability(p: float | None) -> str:
-    """Return a p-value, two digits."""
-    if p is None:
-        return ABSENT
-    return "< 0.001" if p < 0.001 else f"{p:.2g}"
+    """Return a p-value with two digits."""
+    return ABSENT if p is None else "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
@@ -225,20 +204,19 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
         return ()
     notes = [
         "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
-        "p: of no difference at all, by exchanging A and B within replicates. Effect: the difference over the standard "
-        "deviation of the replicates' differences. n counts replicates."
+        "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all comparisons "
+        "that the matrix declares, others are exploratory. n counts replicates."
     ]
     for pair, apart in found:
-        task, region = pair.row["task"], pair.row.get("equivalence")
-        same = f"scores within {region:g}{suffix(pair.row['unit'])} are practically the same" if region else ""
+        region, unit = pair.row.get("equivalence"), suffix(pair.row["unit"])
+        same = f"scores within {region:g}{unit} count as equal" if region else "no region of equivalence is declared"
         least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
-        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}{least}.")
+        notes.append(f"{pair.row['task']}: {apart.method}; {same}{least}.")
         if pair.folds:
             notes.append(
                 f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    notes.append("p Holm is corrected for all comparisons that the matrix declares; others are exploratory.")
     return tuple(dict.fromkeys(notes))
 
 
@@ -252,8 +230,8 @@ def record_of(pair: PairwiseComparison) -> dict[str, Any]:
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
         "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
-        "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected, "effect": found.get("effect"),
-        "improved": found.get("improved"), "equivalence": row.get("equivalence"),
-        **{key: found.get(key) for key in ("verdict", "beyond", "paired", "replicates")},
-        "replicate_unit": found.get("unit"), "method": found.get("method"), "refused": pair.refused,
+        "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected,
+        **{key: found.get(key) for key in ("effect", "improved", "verdict", "beyond", "paired", "replicates")},
+        "method": found.get("method"), "equivalence": row.get("equivalence"), "replicate_unit": found.get("unit"),
+        "refused": pair.refused,
     }  # fmt: skip

@@ -7,18 +7,16 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import WORSE_END, Bars, Row, answer_name, grouped, sensor_name, sign_of
+from tactbench.core.leaderboard.names import WORSE_END, Row, answer_name, grouped, sensor_name, sign_of
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable
 
 LEAK_SHARE = 0.5
-"""Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came
-before the contact then explains as much as all that the contact adds."""
+"""Share of the skill (score beyond the trivial answer's) from which on that of the first frame is called a leak."""
 TAIL = 0.025
-"""Probability that guessing does as well, below which a first frame predicts better than a guess: the tail of the
-leaderboard's 95 % intervals."""
+"""Probability of as many right guesses below which the first frame predicts better than a guess."""
 FEWEST = 5
 """Smallest number of recordings for an interval of the error of first frames."""
 COLUMNS = (
@@ -28,71 +26,61 @@ COLUMNS = (
 _NOTE = (
     f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer), or the "
     "row is stamped (‡); PART: less, but more than a guess. OPTIMISTIC: shuffled rows score beyond the interval of the "
-    "split. TRIVIAL: an answer that reads no sensor scores as well, or the interval does not exclude it (TRIVIAL?). "
-    "See docs/real-recordings.md."
+    "split. See docs/real-recordings.md."
 )
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
-    """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
-    bars = Bars(rows)
+    """Return a table of finished answers under `deployable` beside their probes; None if nothing was probed."""
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
     for row, first, shuffled in _probed(rows):
         if first is not None or shuffled is not None:
-            lines.append(_line(row, shuffled, first, bars))
+            interval_of = interval(row["ci_low"], row["ci_high"], row["unit"])
+            lines.append((
+                sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
+                _shown(row), Entry(interval_of, row["ci_low"], cell=row["cell"]), _shown(shuffled), _shown(first),
+                Entry(score(row["baseline"], row["unit"]), row["baseline"]),
+                ", ".join(_verdicts(row, shuffled, first)) or "no leak shown",
+            ))  # fmt: skip
         if first is not None and first["status"] == "skipped":
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
         return None
-    kinds = tuple("alarm" if {"LEAK", "TRIVIAL"} & set(line[-1].split(", ")) else "plain" for line in lines)
+    kinds = tuple("alarm" if "LEAK" in line[-1] else "plain" for line in lines)
     title = "Probe · does the score come from the contact?"
     return TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[4:9]), notes=(_NOTE, *skipped), kinds=kinds)
 
 
 def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows, with a stamp where the first frame gives an answer away: the mark of whatever table shows them."""
-
-    def scored(row: Row) -> str:
-        return score_with_unit(row["score"], row["unit"])
-
-    found = {
-        row["cell"]: f"{LEAKS}first frame alone {scored(first)} of {scored(row)}."
-        for row, first, _ in _probed(rows)
-        if first is not None and _of_first_frame(row, first) == "LEAK"
-    }
-    return [{**row, "stamps": [*row["stamps"], found[row["cell"]]]} if row["cell"] in found else row for row in rows]
+    """Return rows, with a stamp where the first frame explains half of the skill or more."""
+    found: dict[str, list[str]] = {}
+    for row, first, _ in _probed(rows):
+        if first is not None and _of_first_frame(row, first) == "LEAK":
+            alone, whole = (score_with_unit(one["score"], one["unit"]) for one in (first, row))
+            found[row["cell"]] = [f"{LEAKS}first frame alone {alone} of {whole}."]
+    return [{**row, "stamps": [*row["stamps"], *found[row["cell"]]]} if row["cell"] in found else row for row in rows]
 
 
 def _probed(rows: Sequence[Row]) -> Iterator[tuple[Row, Row | None, Row | None]]:
     """Yield each answer that may be probed, the same from first frames, and from shuffled rows."""
-    alike = grouped(rows, _answer)
+
+    def answer(row: Row) -> tuple[str, ...]:
+        return row["sensor"], row["task"], row["rig"], answer_name(row)
+
+    alike = grouped(rows, answer)
     for row in rows:
-        if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
+        # In-session and shuffled splits keep nothing apart: there is no other score to compare theirs with.
+        if row["is_baseline"] or row["status"] != "done" or row["split"] in ("shuffled", "in-session"):
             continue
-        if row["split"] in ("shuffled", "in-session"):
-            continue  # neither keeps recordings or groups apart: there is nothing to compare with
-        first = _probe_of(alike[_answer(row)], FIRST_FRAME.name, row["split"])
-        yield row, first, _probe_of(alike[_answer(row)], DEPLOYABLE.name, "shuffled")
-
-
-def _answer(row: Row) -> tuple[str, ...]:
-    return row["sensor"], row["task"], row["rig"], answer_name(row)
+        if row["protocol"] == DEPLOYABLE.name:
+            own = alike[answer(row)]
+            yield row, _probe_of(own, FIRST_FRAME.name, row["split"]), _probe_of(own, DEPLOYABLE.name, "shuffled")
 
 
 def _probe_of(alike: Sequence[Row], protocol: str, split: str) -> Row | None:
-    """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
+    """Return the same answer under a protocol and split; the row of a cell that was not begun may lack its split."""
     return next((one for one in alike if one["protocol"] == protocol and one["split"] in (split, None)), None)
-
-
-def _line(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> tuple[str, ...]:
-    bar = score(bars.score(row), row["unit"]) + (f" {bars.name(row)}" if bars.trivial(row) else "")
-    return (
-        sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
-        _shown(row), Entry(interval(row["ci_low"], row["ci_high"], row["unit"]), row["ci_low"], cell=row["cell"]),
-        _shown(shuffled), _shown(first), Entry(bar, bars.score(row), cell=row["cell"]),
-        ", ".join(_verdicts(row, shuffled, first, bars)) or "no leak shown",
-    )  # fmt: skip
 
 
 def _shown(row: Row | None) -> str:
@@ -102,14 +90,12 @@ def _shown(row: Row | None) -> str:
     return Entry(text, row["score"], cell=row["cell"])
 
 
-def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> Iterator[str]:
-    sign = sign_of(row)
-    if bars.trivial(row) is not None and (bars.no_better(row) or bars.unshown(row)):
-        yield "TRIVIAL" if bars.no_better(row) else "TRIVIAL?"
+def _verdicts(row: Row, shuffled: Row | None, first: Row | None) -> Iterator[str]:
     leaks = any(str(stamp).startswith(LEAKS) for stamp in row["stamps"])
     if verdict := "LEAK" if leaks else _of_first_frame(row, first):
         yield verdict
     if shuffled is not None and shuffled["status"] == "done":
+        sign = sign_of(row)
         best = row[WORSE_END[-sign]]
         if best is None:
             yield "no interval for shuffled rows"
@@ -118,7 +104,7 @@ def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> 
 
 
 def _of_first_frame(row: Row, first: Row | None) -> str:
-    """Return how much of an answer the first frame explains: LEAK, PART, that it is unknown, or nothing."""
+    """Return the part of an answer's skill that the first frame explains: LEAK, PART, unknown, or nothing."""
     sign, trivial = sign_of(row), row["baseline"]
     if first is None or first["status"] != "done" or trivial is None:
         return ""
@@ -130,10 +116,10 @@ def _of_first_frame(row: Row, first: Row | None) -> str:
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
-    """Tell whether the first frame answers better than a guess; None if too few recordings or replicates can tell.
+    """Return whether the first frame answers better than a guess; None if there are too few recordings.
 
-    Classes: the exact binomial tail of so many right answers, each recording being one answer and the commonest class
-    the guess. Numbers: the interval lies beyond the trivial score.
+    Classes: by the exact binomial tail of the number of right answers, one for each recording; the guess is the
+    commonest class. Numbers: if the interval lies beyond the trivial score.
     """
     if first["confusion"] is not None:
         table = first["confusion"]

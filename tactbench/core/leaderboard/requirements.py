@@ -1,6 +1,6 @@
-"""Which sensors meet given requirements: columns of the leaderboard that say so.
+"""Columns of the leaderboard that show which sensors meet given requirements.
 
-A requirement is met, missed or unknown. What no source states is unknown, and so is what is only assumed.
+A requirement is met, missed or unknown. A fact that no source states is unknown, and so is one that is only assumed.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from tactbench.core.leaderboard.columns import Line
-from tactbench.core.leaderboard.names import Row, no_better, sensor_name
+from tactbench.core.leaderboard.names import Bars, Row, sensor_name
 from tactbench.core.leaderboard.sentences import Note
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.spec.sensor import SensorSpec
@@ -28,7 +28,7 @@ _PARTS = ("sampling", "link", "window", "features", "prediction")
 
 
 class Requirements(NamedTuple):
-    """What a sensor and its answers must reach; None: no requirement."""
+    """Requirements on a sensor and its answers; None: no requirement."""
 
     max_delay_ms: float | None = None
     """Largest time from a touch to the answer [ms]."""
@@ -38,26 +38,26 @@ class Requirements(NamedTuple):
     """Smallest rate of answers [Hz]."""
 
 
-def held_against(table: Table, required: Requirements, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> Table:
+def with_requirements(table: Table, required: Requirements, task: TaskSpec, specs: Mapping[str, SensorSpec]) -> Table:
     """Return the answers of a table of one task with a column for each requirement.
 
-    An answer that misses fewer requirements comes first, then one of which less is unknown, then one of a better place;
+    Answers that miss fewer requirements come first, then those of which less is unknown, then those of a better place;
     trivial answers are left out, and those that cannot be used come last.
 
     Parameters
     ----------
-    sensors
-        Specs by name; the range and the rate of a sensor that is not among them are unknown.
+    specs
+        By sensor; the range and the rate of a sensor that is not among them are unknown.
     """
-    blocks = tuple(_block(block, required, task, sensors) for block in table.blocks)
+    blocks = tuple(_block(block, required, task, specs) for block in table.blocks)
     return replace(table, blocks=tuple(block for block in blocks if block.lines), sections=())
 
 
-def _block(block: Block, required: Requirements, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> Block:
+def _block(block: Block, required: Requirements, task: TaskSpec, specs: Mapping[str, SensorSpec]) -> Block:
     found: list[tuple[tuple[bool, int, int], Line]] = []
     for line in block.lines:
         if not line.row["is_baseline"]:
-            texts = standing(line.row, required, task, sensors.get(line.row["sensor"]))
+            texts = standing(line.row, required, task, specs.get(line.row["sensor"]))
             states = [text.partition(":")[0] for text in texts.values()]
             order = texts.get(ANSWER, "").startswith(MISSED), states.count(MISSED), states.count(UNKNOWN)
             found.append((order, replace(line, texts=dict.fromkeys(COLUMNS, "") | dict(line.texts) | texts)))
@@ -65,29 +65,23 @@ def _block(block: Block, required: Requirements, task: TaskSpec, sensors: Mappin
     meet = dict.fromkeys(sensor_name(line.row) for order, line in found if not any(order))
     verdict = f"All requirements are met by {', '.join(meet)}." if meet else "No answer is known to meet all of them."
     verdicts = (verdict,) * (required != Requirements()) + block.verdict
-    lines = tuple(line for _, line in found)
-    notes = block.notes + _pressed(lines, required, task)
-    return replace(block, lines=lines, verdict=verdicts, notes=notes)
-
-
-def _pressed(lines: tuple[Line, ...], required: Requirements, task: TaskSpec) -> tuple[Note, ...]:
-    """Return a note where the presses behind the scores do not reach the required force, or do not state theirs."""
-    if required.range_n is None or not lines:
-        return ()
-    if not lines[0].row["simulated"]:
-        return (Note("Up to which force these scores hold is unknown: the rows do not state how large it was."),)
-    most_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=0.0)
-    beyond = f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown."
-    return (Note(beyond),) if required.range_n > most_n else ()
+    notes = block.notes
+    if required.range_n is not None:
+        most_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=0.0)
+        if not block.lines[0].row["simulated"]:
+            notes += (Note("The largest force behind these scores is unknown: the rows do not state it."),)
+        elif required.range_n > most_n:
+            notes += (Note(f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown."),)
+    return replace(block, lines=tuple(line for _, line in found), verdict=verdicts, notes=notes)
 
 
 def standing(row: Row, required: Requirements, task: TaskSpec, spec: SensorSpec | None) -> dict[str, str]:
-    """Return how a row stands to each requirement, by column: ``met: 30 N``, ``missed: 50 Hz``, ``unknown: …``."""
+    """Return for each column whether a row meets its requirement: ``met: 30 N``, ``missed: 50 Hz``, ``unknown: …``."""
     if spec is not None and not spec.data_sheet.exists:
         return {ANSWER: f"{MISSED}: the sensor is a definition, no device"}
     if row["status"] != "done":
         return {ANSWER: f"{MISSED}: the cell is {row['status']}"}
-    if no_better(row):
+    if Bars().no_better(row):
         return {ANSWER: f"{MISSED}: no better than a trivial answer"}
     rate_hz = _stated_rate_hz(task, spec)
     found = {ANSWER: f"{UNKNOWN}: no trivial answer beside it"} if row.get("baseline") is None else {}

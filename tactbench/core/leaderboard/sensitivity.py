@@ -96,16 +96,15 @@ class Sensitivity:
 
 
 def _order(rows: Mapping[str, Row]) -> set[tuple[str, str]]:
-    """Return which sensor is shown to be better than which."""
+    """Return the pairs of sensors of which the first is shown to be better."""
     done = {sensor: row for sensor, row in rows.items() if row["status"] == "done"}
     pairs = permutations(done, 2)
     return {(one, other) for one, other in pairs if difference(done[one], done[other]).verdict == "better"}
 
 
 def _order_text(rows: Mapping[str, Row]) -> str:
-    done = sorted(
-        (sensor for sensor, row in rows.items() if row["status"] == "done"), key=lambda one: error_of(rows[one])
-    )
+    done = [sensor for sensor, row in rows.items() if row["status"] == "done"]
+    done.sort(key=lambda one: error_of(rows[one]))
     order = _order(rows)
     return "".join(f"{' > ' if pair in order else ' ≈ '}{pair[1]}" for pair in pairwise(["", *done]))[3:]
 
@@ -138,40 +137,40 @@ def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[s
 
 
 def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[TextTable]:
-    """Return a table a question; `specs`, by sensor, have ranges and sources."""
+    """Return a table for each question; `specs`, by sensor, have ranges and sources."""
     return [_table(found, specs) for found in sensitivities(store).values()]
 
 
 def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
     row, sensors = next(iter(found.stated.values())), list(found.stated)
     names = sorted(found.rows, key=lambda name: (len(ends_of(name)), -max(abs(found.change(name, s)) for s in sensors)))
-    numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
-    shipped = [text for one in found.stated.values() for text in (score(one["score"], one["unit"]), "")]
-    lines = [["as stated", "", "", "", *shipped, _order_text(found.stated)]]
+    stated = [text for one in found.stated.values() for text in (score(one["score"], one["unit"]), "")]
+    lines = [["as stated", "", "", "", *stated, _order_text(found.stated)]]
     notes = dict.fromkeys([_NOTE])
     for name in names:
         ends, own = ends_of(name), found.rows[name]
         nuisance = next(iter(ends))
         values = (_alike({s: f"{one['simulation']['nuisances'][end]:g}" for s, one in own.items()}) for end in ends)
-        ranges = {sensor: ranges_of(specs[sensor]).get(nuisance) for sensor in own if sensor in specs}
-        alone = {sensor: one for sensor, one in ranges.items() if one is not None and len(ends) == 1}
-        for sensor, one in alone.items():
-            of = f"{nuisance}, {sensor}" if nuisance not in RANGES else nuisance
-            notes[f"{of}: {one.source.reference} ({one.source.tag})."] = None
+        ranges: dict[str, PhysicalRange] = {}
+        if len(ends) == 1:
+            known = {sensor: ranges_of(specs[sensor]) for sensor in own if sensor in specs}
+            ranges = {sensor: of[nuisance] for sensor, of in known.items() if nuisance in of}
+        for sensor, one in ranges.items():
+            of_sensor = f"{nuisance}, {sensor}" if nuisance not in RANGES else nuisance
+            notes[f"{of_sensor}: {one.source.reference} ({one.source.tag})."] = None
         lines.append([
             ", ".join(ends), ", ".join(values),
-            _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in alone.items()}),
-            _alike({sensor: one.source.tag for sensor, one in alone.items()}),
+            _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in ranges.items()}),
+            _alike({sensor: one.source.tag for sensor, one in ranges.items()}),
             *(text for sensor in sensors for text in _scores(found, name, sensor)),
             f"{_order_text({**found.stated, **own})}: {found.verdict(name)}",
         ])  # fmt: skip
     campaigns = counted(row["n_replicates"] or 0, "campaign")
-    title = " · ".join(
-        [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
-    )
-    columns = ("nuisance", "value", "range", "source", *numeric, "order")[: None if len(sensors) > 1 else -1]
+    about = [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
+    numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
+    columns = ("nuisance", "value", "range", "source", *numeric, *(["order"] if len(sensors) > 1 else []))
     lines = [line[: len(columns)] for line in lines]
-    table = text_table(title, columns, lines, numeric=numeric, notes=tuple(notes))
+    table = text_table(" · ".join(about), columns, lines, numeric=numeric, notes=tuple(notes))
     return replace(table, first_to_go=("source", "range"))
 
 

@@ -1,12 +1,11 @@
 """The sentences above and below a block: a closed list, each with the condition under which it is true.
 
-docs/tables.md has the list. At most two sentences stand above and five notes below; what comes first here comes first
-there. ``tactbench why`` and the report have everything else that is known of a row.
+docs/tables.md has the list. At most two sentences stand above and five notes below, in the order of this module.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
@@ -14,21 +13,15 @@ from typing import NamedTuple
 from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, metric_name, sign_of
 from tactbench.core.spec.row import LEAKS, STOPPED, plural
 from tactbench.core.statistics.rank import Rank, beyond_floor
-from tactbench.core.statistics.replicates import (
-    FEWEST,
-    against_reference,
-    count_range,
-    least_coverage,
-    percent,
-)
+from tactbench.core.statistics.replicates import FEWEST, against_reference, count_range, least_coverage, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
 MOST_BELOW = 5
 MOST_NAMES = 4
-"""Answers that a sentence names; it counts the others."""
+"""Number of answers that a sentence names; it counts the others."""
 LONGEST = 300
-"""Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
+"""Characters of a note."""
 ORDER_DEPENDS_ON = "order_depends_on"
 """Key of a row: the nuisances at whose ends the order of the sensors turns round, where that has been computed."""
 NO_BETTER, UNSHOWN, STAMPED, FOUND, SHARED = "–", "*", "‡", "!", "="
@@ -38,43 +31,43 @@ class Note(NamedTuple):
     """A line below a table."""
 
     text: str
-    hint: str = ""
-    """Command that follows on a screen and is left out in a paper."""
     printed: bool = False
     """Whether a table in a paper needs it, to explain a mark or the scores."""
-
-    def __str__(self) -> str:
-        return f"{self.text}{self.hint}"
 
 
 @dataclass(frozen=True)
 class Board:
     """The rows of a block."""
 
-    placed: Sequence[tuple[Row, Rank]]
-    """Answers better than the trivial one of their sensor, in order."""
+    placed: Sequence[Row]
+    """Answers better than the trivial one of their sensor, the best first."""
+    ranks: Mapping[str, Rank]
+    """Their ranks by the names of their cells; empty if there are too few campaigns or held-out units."""
     unplaced: Sequence[Row]
     """Answers that are no better than the trivial one of their sensor."""
     trivial: Sequence[Row]
     stopped: Sequence[Row]
     """Cells without a score."""
-    unranked: str
-    """Reason why places rest on no intervals; empty if they do."""
     bars: Bars
 
     @property
     def answers(self) -> list[Row]:
         """Return the answers, those with a place first."""
-        return [*(row for row, _ in self.placed), *self.unplaced]
+        return [*self.placed, *self.unplaced]
+
+    @property
+    def finished(self) -> list[Row]:
+        """Return the answers and the trivial answers."""
+        return [*self.answers, *self.trivial]
 
     @property
     def by_floor(self) -> bool:
         """Return whether places go by errors beyond the floor."""
-        return beyond_floor([row for row, _ in self.placed])
+        return beyond_floor(self.placed)
 
     def name(self, row: Row) -> str:
         """Return the name of a row in a sentence: its estimator, with the sensor where there are several."""
-        several = len({one["sensor"] for one in (*self.answers, *self.trivial)}) > 1
+        several = len({one["sensor"] for one in self.finished}) > 1
         return f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row)
 
     def marks(self, row: Row) -> list[str]:
@@ -84,7 +77,7 @@ class Board:
         return [mark for mark, has in found.items() if has]
 
     def bars_of(self, rows: Sequence[Row]) -> str:
-        """Return the trivial answers that rows are held against, with their scores."""
+        """Return the trivial answers that rows are compared with, and their scores."""
         several = len({row["sensor"] for row in self.answers}) > 1
         texts = (
             f"{row['sensor']}/" * several
@@ -102,25 +95,22 @@ def _some(names: Sequence[str]) -> str:
 
 def above(board: Board) -> tuple[str, ...]:
     """Return the sentences above a table."""
-    sentences = (_outcome(board), _timed(board) or _dependence(board))
-    return tuple(sentence for sentence in sentences if sentence)
+    return tuple(filter(None, (_outcome(board), _timed(board) or _dependence(board))))
 
 
 def _outcome(board: Board) -> str:
     """Return which answer is best, or why none is shown to be."""
     if not board.placed:
-        count = len(board.unplaced)
-        whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
-        bars = board.bars_of(board.unplaced)
-        return f"{whom} better than the trivial one of its own sensor ({bars})." if count else ""
-    (first, leader), *others = board.placed
+        count, bars = len(board.unplaced), board.bars_of(board.unplaced)
+        of = "The only answer" if count == 1 else f"None of {count} answers"
+        scores = "scores no better" if count == 1 else "scores better"
+        return f"{of} {scores} than the trivial one of its own sensor ({bars})." if count else ""
+    first, *others = board.placed
     name = board.name(first)
     where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
     quality = "the smallest error beyond the floor" if board.by_floor else "the best score"
-    if board.unranked == "few":
-        return f"{_too_few([row for row, _ in board.placed])}; {name} has {quality}."
-    if board.unranked or leader.low is None:
-        return f"Places are by score alone: {board.unranked or 'an answer has no interval'}."
+    if not board.ranks:
+        return f"{_too_few(board.placed)}; {name} has {quality}."
     if board.bars.unshown(first):
         return (
             f"{where}{name} has {quality}, and is not shown to be better than the trivial "
@@ -128,18 +118,19 @@ def _outcome(board: Board) -> str:
         )
     if not others:
         if board.bars.score(first) is None:
-            return "" if board.unplaced else f"{name} is the only answer."
+            return ""
         only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
         return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
     # Answers of the same place differ from it in single pairs at most, and of many pairs some differ by chance.
-    alike = [row for row, rank in others if rank.place == leader.place or not rank.behind]
+    place = board.ranks[first["cell"]].place
+    alike = [row for row in others if (rank := board.ranks[row["cell"]]).place == place or not rank.behind]
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be distinguished from it."
-    return f"{where}{name} is best; {_closest(board, first, [row for row, _ in others])}."
+    return f"{where}{name} is best; {_closest(board, first, others)}."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
-    """Return that there are too few campaigns, or sessions, to say more."""
+    """Return the number of campaigns or held-out units, which is too small for intervals."""
     if held_out(rows[0]):
         unit, more = str(rows[0]["replicate_unit"]), " of each class" if rows[0]["classes"] else ""
     else:
@@ -149,7 +140,7 @@ def _too_few(rows: Sequence[Row]) -> str:
 
 
 def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
-    """Return the answer that is the least worse than the best one, and by how much it is worse."""
+    """Return the answer that is closest to the best one, and the difference of their scores."""
     from tactbench.core.statistics.paired import difference  # numerics
 
     unit, sign = first["unit"], -sign_of(first)
@@ -163,7 +154,7 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
 
 
 def _timed(board: Board) -> str:
-    """Return that a trivial answer knows only the time, if an answer of its sensor is not shown to be better."""
+    """Return the trivial answers that read only the time, if an answer of their sensor is not shown to be better."""
     held = [row for row in board.answers if board.bars.no_better(row) or board.bars.unshown(row)]
     bars = [trivial for row in held if (trivial := board.bars.trivial(row)) is not None]
     timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
@@ -181,34 +172,25 @@ def _dependence(board: Board) -> str:
 
 def below(board: Board) -> tuple[Note, ...]:
     """Return the notes below a table."""
-    notes = (
-        *_marks(board),
-        *_ended(board, True),
-        *_protocol(board),
-        *_floors(board),
-        *_compared(board),
-        *_how(board),
-        *_hosts(board),
-        *_ended(board, False),
-    )
+    notes = [*_marks(board), *_ended(board, failed=True), *_protocol(board), *_floors(board), *_compared(board),
+             *_how(board), *_hosts(board), *_ended(board, failed=False)]  # fmt: skip
     return tuple(note._replace(text=cut(note.text, LONGEST)) for note in notes)[:MOST_BELOW]
 
 
-def _ended(board: Board, stopped: bool) -> Iterator[Note]:
-    """Yield which cells did not finish, or were skipped, and why."""
-    rows = [row for row in board.stopped if (row["status"] in STOPPED) is stopped]
+def _ended(board: Board, *, failed: bool) -> Iterator[Note]:
+    """Yield which cells failed, or were skipped, and why."""
+    rows = [row for row in board.stopped if (row["status"] in STOPPED) is failed]
     if not rows:
         return
     alike = [row for row in rows if (row["status"], row["reason"]) == (rows[0]["status"], rows[0]["reason"])]
     names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in alike))
     others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
-    text = f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}."
-    yield Note(text, " `tactbench why CELL` shows more." if stopped and all(row["made_by"] for row in rows) else "")
+    yield Note(f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}.")
 
 
 def _marks(board: Board) -> Iterator[Note]:
     """Yield a note for each mark in the table; they are never more than the notes that may be shown."""
-    finished = (*board.answers, *board.trivial)
+    finished = board.finished
     for mark, key in ((STAMPED, "stamps"), (FOUND, "findings")):
         texts = grouped([(str(text), row) for row in finished for text in row.get(key) or ()], itemgetter(0))
         if not texts:
@@ -220,29 +202,26 @@ def _marks(board: Board) -> Iterator[Note]:
             for text, of in texts.items()
         )
         yield Note(f"{mark}  {lead}{texts_of}{'' if texts_of.endswith('?') else '.'}", printed=True)
-    if any(rank.unsure for _, rank in board.placed) and not board.unranked:
+    if any(rank.unsure for rank in board.ranks.values()):
         yield Note(f"{SHARED}  each of these rows cannot be distinguished from at least one other")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
-    unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
+    unshown = [row for row in board.placed if UNSHOWN in board.marks(row)]
     if unshown:
         yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
 
 
 def _protocol(board: Board) -> Iterator[Note]:
-    """Yield that the protocol uses the test set, if it does."""
-    finished = (*board.answers, *board.trivial)
-    protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
+    """Yield a note on a protocol that uses the test set."""
+    protocol = next((row["protocol"] for row in board.finished if row["dagger"]), None)
     if protocol is not None:
-        text = f"Protocol {protocol} uses means and deviations of the test set, unknown in use"
-        yield Note(text, "; `tactbench run --protocol deployable` does not.", printed=True)
+        yield Note(f"Protocol {protocol} uses means and deviations of the test set, unknown in use.", printed=True)
 
 
 def _floors(board: Board) -> Iterator[Note]:
-    """Yield which force an error is against, and the floor that the noise of the reference sets to errors."""
-    finished = (*board.answers, *board.trivial)
-    simulated = next((row for row in finished if row.get("reference_score") is not None), None)
+    """Yield definitions of the errors of force, and the floor that the noise of the reference sets to them."""
+    simulated = next((row for row in board.finished if row.get("reference_score") is not None), None)
     if simulated is not None:
         true, noisy = (metric_name({**row, "unit": "1"}) for row in (simulated, against_reference(simulated)))
         text = f"{true[:1].upper()}{true[1:]}: against the force exerted. {noisy}: against the noisy reference."
@@ -255,40 +234,15 @@ def _floors(board: Board) -> Iterator[Note]:
         unit, floors = rows[0]["unit"], sorted(row["reference_floor"] for row in rows)
         ends = dict.fromkeys(score(end, unit) for end in (floors[0], floors[-1]))
         reach = 1.96 * max(row.get("reference_floor_se") or 0.0 for row in rows)
-        least = score(((floors[-1] + reach) ** 2 - floors[-1] ** 2) ** 0.5, unit)
-        sure = f" ± {score(reach, unit)}, which resolves no error below {least}" if reach else ""
-        parts.append(f"{sensor} {' … '.join(ends)}{sure}")
+        parts.append(f"{sensor} {' … '.join(ends)}{f' ± {score(reach, unit)}' if reach else ''}")
     by = "; places go by it" if board.placed and board.by_floor else ""
     yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)}).")
 
 
-def _how(board: Board) -> Iterator[Note]:
-    """Yield definitions of score, interval, range and delay."""
-    parts = []
-    campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
-    if campaigns:
-        counts = [row["n_replicates"] for row in campaigns]
-        median = f"Score: median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
-        shown = [row["n_replicates"] for row in campaigns if row["ci_low"] is not None]
-        least = 100 * min(map(least_coverage, shown), default=0.0)
-        interval_of = (
-            f"; interval: of that median, coverage at least {least:.3g} % for any distribution" if shown else ""
-        )
-        several = f"{median}{interval_of}; range: lowest … highest campaign"
-        parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
-    sentences = list(parts)
-    if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
-        sentences.append("Open: so few put no upper bound to the error")
-    if any(row.get("answer_delay_ms") is not None for row in board.answers):
-        sentences.append("Delay: sampling, link, window, computing; training: the final fit")
-    if sentences:
-        yield Note(f"{'. '.join(sentences)}.")
-
-
 def _compared(board: Board) -> Iterator[Note]:
     """Yield how rows of several sensors are compared on recordings, and what that comparison cannot show."""
-    rows = [row for row, _ in board.placed if held_out(row)]
-    if board.unranked or len({row["sensor"] for row in rows}) < 2:
+    rows = [row for row in board.placed if held_out(row)]
+    if not board.ranks or len({row["sensor"] for row in rows}) < 2:
         return
     unit = plural(str(rows[0]["replicate_unit"]))
     shared = len({tuple(row["replicates"]["names"]) for row in rows}) == 1
@@ -302,8 +256,25 @@ def _compared(board: Board) -> Iterator[Note]:
     yield Note(f"Places: {'; '.join(parts)}.", printed=True)
 
 
+def _how(board: Board) -> Iterator[Note]:
+    """Yield definitions of score and interval."""
+    sentences = []
+    campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
+    if campaigns:
+        counts = [row["n_replicates"] for row in campaigns]
+        covered = [least_coverage(row["n_replicates"]) for row in campaigns if row["ci_low"] is not None]
+        least = f"; interval: of that median, coverage at least {100 * min(covered):.3g} %" if covered else ""
+        median = f"median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
+        several = f"Score: {median}{least}"
+        sentences.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
+    if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
+        sentences.append("Open: so few put no upper bound to the error")
+    if sentences:
+        yield Note(f"{'. '.join(sentences)}.")
+
+
 def _hosts(board: Board) -> Iterator[Note]:
-    """Yield why times cannot be compared, if they cannot."""
+    """Yield the reason why times cannot be compared."""
     timed = [row for row in board.answers if row["fit_s"] is not None]
     hosts = len({str(row.get("host") or "") for row in timed})
     at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)

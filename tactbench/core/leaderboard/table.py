@@ -1,8 +1,8 @@
 """Builds from rows the one table object that every format renders.
 
-Rows that may be compared stand in one block; no rank spans two. Rows under different tasks, protocols or splits, and
-rows from the twin and from hardware, are not comparable. A table depends on its rows alone, never on their order. All
-its text is fit to be shown (`text.visible`); a format escapes what its own syntax would act on, and changes no digit.
+Rows that may be compared stand in one block, and ranks are within a block. Rows under different tasks, protocols or
+splits, and rows from the twin and from hardware, are not comparable. A table depends on its rows, not on their order.
+Control characters in its texts are escaped (`text.visible`); formats escape their own syntax.
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.events import events_table
-from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.leaderboard.names import (
     Bars,
     Row,
+    direction,
     error_of,
     grouped,
     hardware_name,
     metric_name,
-    sign_of,
     split_name,
 )
 from tactbench.core.leaderboard.probe import build_probe, with_leaks
@@ -84,7 +83,7 @@ class Table:
     @property
     def notes(self) -> tuple[str, ...]:
         """Return the notes of all blocks, each once."""
-        return tuple(dict.fromkeys(str(note) for block in self.blocks for note in block.notes))
+        return tuple(dict.fromkeys(note.text for block in self.blocks for note in block.notes))
 
     @property
     def footer(self) -> tuple[str, ...]:
@@ -96,10 +95,10 @@ class Table:
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row a cell over its replicates, with the level of its sensor, what its order rests on, and stamps."""
+    """Return one row a cell over its replicates, with stamps of leaks and the nuisances its order depends on."""
     from tactbench.core.leaderboard.sensitivity import with_dependence  # numerics
 
-    return with_dependence(with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance)), store)
+    return with_dependence(with_leaks(over_replicates(rows)), store)
 
 
 def table_of(store: Store, rows: Sequence[Row]) -> Table:
@@ -112,10 +111,7 @@ def table_of(store: Store, rows: Sequence[Row]) -> Table:
 
 
 def build_table(
-    rows: Sequence[Row],
-    provenance: Sequence[Row] = (),
-    *,
-    questions: Mapping[str, str] | None = None,
+    rows: Sequence[Row], provenance: Sequence[Row] = (), *, questions: Mapping[str, str] | None = None
 ) -> Table:
     """Arrange `rows` into ranked blocks, with their sentences and notes.
 
@@ -124,21 +120,15 @@ def build_table(
     rows
         Rows of one folder or of several, in any order.
     provenance
-        What is known of the runs they are from: see `tactbench.core.provenance.gather`.
+        Versions, machine and commit of their runs: see `tactbench.core.provenance.gather`.
     questions
-        What tasks ask, by name.
+        Questions of the tasks, by name.
     """
-    blocks = blocks_of(sorted(rows, key=itemgetter("cell")), questions or {})
+    groups = sorted(_grouped(sorted(rows, key=itemgetter("cell"))).items(), key=lambda group: _order(group[0]))
+    blocks = tuple(_block(key, members, (questions or {}).get(key[0], "")) for key, members in groups)
     ordered = [line.row for block in blocks for line in block.lines]
     sections = (events_table(ordered), build_probe(ordered))
-    found = tuple(section for section in sections if section is not None)
-    return Table(blocks, found, tuple(provenance))
-
-
-def blocks_of(rows: Sequence[Row], questions: Mapping[str, str]) -> tuple[Block, ...]:
-    """Arrange rows, in the order of their cells' names, into ranked blocks."""
-    groups = sorted(_grouped(rows).items(), key=lambda group: _order(group[0]))
-    return tuple(_block(key, members, questions.get(key[0], "")) for key, members in groups)
+    return Table(blocks, tuple(section for section in sections if section is not None), tuple(provenance))
 
 
 def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
@@ -147,40 +137,37 @@ def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
     finished = [row for row in members if row["status"] == "done"]
     answers = [row for row in finished if not row["is_baseline"]]
     entered = [row for row in answers if not bars.no_better(row)]
-    # What is equal stays in the order of the names.
-    ordered = sorted(zip(errors(entered), entered, strict=True), key=lambda one: (one[0], error_of(one[1])))
-    found, unranked = places([row for _, row in ordered])
-    # Of equal place stays the better one first.
-    placed = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
+    order = dict(zip((row["cell"] for row in entered), errors(entered), strict=True))
+    entered.sort(key=lambda row: (order[row["cell"]], error_of(row)))  # equal ones in the order of their names
+    ranks: dict[str, Rank] = {}
+    if entered and all(map(_may_be_placed, entered)):
+        from tactbench.core.statistics.ranking import ranks as ranks_of  # numerics
+
+        ranks = ranks_of(entered)
+        entered.sort(key=lambda row: ranks[row["cell"]].place)
     unplaced = sorted((row for row in answers if bars.no_better(row)), key=error_of)
     trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
     stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
-    board = Board(placed, unplaced, trivial, stopped, unranked, bars)
-    few = unranked == "few"
-    lines = [
-        *(line_of(row, None if few else placing, board.marks(row)) for row, placing in placed),
-        *(line_of(row, None, board.marks(row), NO_BETTER) for row in unplaced),
-        *(
-            line_of(row, None, board.marks(row), "oracle" if row.get("looks_at") == "reference" else "")
-            for row in trivial
-        ),
-        *(line_of(row, None, ()) for row in stopped),
-    ]
-    direction = "lower" if sign_of(members[0]) > 0 else "higher"
-    setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]
+    board = Board(entered, ranks, unplaced, trivial, stopped, bars)
+    texts = {str(row["cell"]): NO_BETTER for row in unplaced}
+    texts |= {str(row["cell"]): "oracle" for row in trivial if row.get("looks_at") == "reference"}
+    setting = [f"{metric_name(members[0])}, {direction(members[0])}", f"protocol {protocol}"]
     setting += [split_name(split)] if split else []
     classes = [len(row["classes"]) for row in finished if row["classes"]]
     setting += [count_range(classes, "class")] if classes else []
+    asked = f": {question[:1].lower()}{question[1:]}" if question else ""
     return Block(
-        title=visible(
-            f"{task[:1].upper()}{task[1:]}" + (f": {question[:1].lower()}{question[1:]}" if question else "")
-        ),
+        title=visible(f"{task[:1].upper()}{task[1:]}{asked}"),
         setting=visible(" · ".join(setting)),
         origin=visible(_origin(finished, hardware)),
-        lines=tuple(lines),
+        lines=(
+            *(line_of(row, ranks.get(row["cell"]), board.marks(row), texts.get(row["cell"], ""))
+              for row in board.finished),
+            *map(line_of, stopped),
+        ),
         verdict=tuple(map(visible, above(board))),
-        notes=tuple(Note(visible(one.text), visible(one.hint), one.printed) for one in below(board)),
-    )
+        notes=tuple(one._replace(text=visible(one.text)) for one in below(board)),
+    )  # fmt: skip
 
 
 def _origin(finished: Sequence[Row], hardware: str) -> str:
@@ -192,16 +179,16 @@ def _origin(finished: Sequence[Row], hardware: str) -> str:
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
-    """Return what blocks are sorted by: within a task, what probes or is not kept apart comes after what is."""
+    """Return the sort key of a block: within a task, probes and leaking splits come last."""
     task, protocol, split, _ = key
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
 def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
-    """Group rows by what must not be mixed.
+    """Group rows that may be compared.
 
-    A cell that was not begun knows neither its split, unless one was chosen, nor whether it would have been
-    simulated: it stands with the finished cells of its rig, if these agree.
+    The row of a cell that was not begun lacks its split, unless one was chosen, and its origin: it stands with the
+    finished cells of its rig, if these agree.
     """
     done = [row for row in rows if row["status"] == "done"]
     groups = grouped(done, lambda row: (row["task"], row["protocol"], row["split"], hardware_name(row)))
@@ -215,33 +202,17 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     return groups
 
 
-def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
-    """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
-
-    They are the finished answers of one block, no baselines, the best score first. A row without replicates enters
-    with its own interval.
-    """
-    if any(row.get("replicates") for row in results) and all(map(_may_be_placed, results)):
-        from tactbench.core.statistics.ranking import ranks  # numerics
-
-        return ranks(results), ""
-    ordered = errors(results)
-    by_score = [Rank(1 + ordered.index(error), None, None, ordered.count(error) > 1) for error in ordered]
-    why = "few" if not all(map(_may_be_placed, results)) else "these rows keep no replicates" if results else ""
-    return dict(zip((row["cell"] for row in results), by_score, strict=True)), why
-
-
 def _may_be_placed(row: Row) -> bool:
-    """Return whether a row has enough campaigns or held-out units for a place, or states no number of them."""
-    count = row.get("n_replicates")
-    return count is None or (count >= FEWEST if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None)
+    """Return whether a row has enough campaigns or held-out units for a place."""
+    enough = (row.get("n_replicates") or 0) >= FEWEST
+    return enough if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None
 
 
 def errors(results: Sequence[Row]) -> list[float]:
-    """Return what answers of one metric are ordered by, the lower the better.
+    """Return the numbers by which answers of one metric are ordered, of which less is better.
 
-    The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
-    below zero, where the error beyond the floor is 0, so that two answers of one sensor keep their order.
+    The score; of errors of force the mean square beyond the floor of the reference, if all rows have one. It may be
+    negative where the error beyond the floor is 0, so that two answers of one sensor keep their order.
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]

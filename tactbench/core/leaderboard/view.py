@@ -1,4 +1,4 @@
-"""Selects what of a table is printed for people."""
+"""Selects the rows and columns of a table that are printed for people."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 CELL, REASON = "cell", "reason"
-"""Columns of cells' names, as `why` takes them, and of why cells did not end well."""
-_Texts = tuple[dict[str, str], str]
-"""The texts of a line by column, and its kind."""
+"""Columns of the names of cells, and of the reasons why they did not finish."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
-    "range", "training", "level", "published", "delay after touch",
+    "training", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal leaves out first, in this order; those that are chosen by name are never left out."""
 
@@ -51,6 +49,7 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
         If there is no such column.
     """
     known = {name: name for name in (*COLUMNS, CELL)} | {shown: name for name, shown in SHOWN.items()}
+    names = [name.strip() for name in names]
     for name in names:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
@@ -58,7 +57,7 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable | tuple[str, ...]]:
-    """Return the tables and notes that are printed, from above."""
+    """Return the tables and notes that are printed, in their order."""
     return [*grids(table, view), *table.sections, *([commands(table, view)] if table.blocks else [])]
 
 
@@ -70,32 +69,28 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     """Return the printed table of a block; its entries have the number they are sorted by and their cell."""
     short = not view.wide and not view.columns
-    # A note says once why trivial answers were skipped.
+    # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
-    lines: list[_Texts] = [(_texts(line), line.kind) for line in shown or block.lines]
+    shown = shown or list(block.lines)
+    texts = list(map(_texts, shown))
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
-    names = tuple(name for name in names if name in lines[0][0])
+    names = tuple(name for name in names if name in texts[0])
     table = TextTable(
         block.title,
         names,
-        tuple(tuple(texts[name] for name in names) for texts, _ in lines),
+        tuple(tuple(one[name] for name in names) for one in texts),
         NUMERIC - {"place"},
         headings=headings(names, block),
-        kinds=tuple(kind for _, kind in lines),
+        kinds=tuple(line.kind for line in shown),
         origin=block.origin,
         summary=(block.setting, *block.verdict),
-        notes=tuple(map(str, block.notes)),
-        # Where there is no interval, the range stands in its place.
-        first_to_go=() if view.columns else tuple(n for n in _FIRST_TO_GO if n != "range" or _has(lines, "interval")),
+        notes=tuple(note.text for note in block.notes),
+        first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )
     # A column of dashes shows that no answer has a place.
-    keep = ("place",) if any(texts["place"] for texts, _ in lines) else ()
+    keep = ("place",) if any(one["place"] for one in texts) else ()
     return table if view.columns else table.compact(keep)
-
-
-def _has(lines: Sequence[_Texts], column: str) -> bool:
-    return any(texts.get(column) for texts, _ in lines)
 
 
 def _texts(line: Line) -> dict[str, str]:
@@ -114,28 +109,28 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
     interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
-    units = [row for row in rows if row["ci_low"] is not None and held_out(row)]
-    if units:
-        counts = [row["n_replicates"] for row in units]
-        interval += f" over {visible(count_range(counts, str(units[0]['replicate_unit'])))}"
+    results = [line.row for line in block.lines if line.kind == "result"]
+    known = [row for row in results if row["ci_low"] is not None and row.get("n_replicates")]
+    if known:
+        of = str(known[0]["replicate_unit"]) if held_out(known[0]) else "campaign"
+        interval += f" over {visible(count_range([row['n_replicates'] for row in known], of))}"
     shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
     shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(rows[0]))}
     return tuple(shown.get(name, name) for name in names)
 
 
 def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
-    """Return commands to run next, and what each shows."""
+    """Return commands to run next, and their purposes."""
     where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
     first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
-    paper = "for a paper, marked “simulated”" if first["simulated"] else "for a paper"
     found = {
         command_line("tactbench", "why", str(first["cell"]), *out): "what this score rests on",
         command_line("tactbench", "report", *where): "figures and every detail",
-        command_line("tactbench", "leaderboard", *where, "--format", "latex"): paper,
+        command_line("tactbench", "leaderboard", *where, "--format", "latex"): "for a paper",
     }
     unprobed = not any(is_probe(row["protocol"]) for row in table.rows)
     if unprobed and not first["simulated"] and first["split"] != "in-session":
-        found["tactbench run … --probe"] = "what the recordings give away"
+        found["tactbench run … --probe"] = "label leakage"
     width = max(map(len, found))
     return tuple(
         f"{'' if place else 'Next: ':6}{command:<{width}}  {what}"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.files import replace_file, writable
-from tactbench.core.leaderboard.names import lower_is_better, metric_name
+from tactbench.core.leaderboard.names import direction, metric_name
 from tactbench.core.report.figures.style import save, styled
 from tactbench.core.report.figures.trade import draw_trade, title_of
 from tactbench.core.tables.numbers import delay, duration, interval, score
@@ -37,10 +37,9 @@ def trade_table(known: Mapping[str, Any]) -> TextTable:
             "remark": "" if one["status"] == "done" else f"{one['status']}: {one['reason']}",
         }  # fmt: skip
         lines.append([Entry(texts[name], one.get(key)) for name, key in _COLUMNS.items()])
-    better = "lower" if lower_is_better(known["metric"]) else "higher"
     nothing = "" if known["trivial"] is None else f" Looking at nothing: {score(known['trivial'], known['unit'])}."
     notes = [
-        f"Score: {metric_name(known)}, {better} is better.{nothing}",
+        f"Score: {metric_name(known)}, {direction(known)}.{nothing}",
         "Front: no other setting is better in both score and answer delay; trees, window, rate and estimators compete.",
     ]
     kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in known["settings"]]

@@ -1,13 +1,12 @@
-"""Compares sensors side by side: the rows of the paper's Table I, data sheets and parameters, with their sources."""
+"""Comparison of sensors: the rows of the paper's Table I, data sheets and parameters, with their sources."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from tactbench.core.spec.quantity import Quantity, Source
-from tactbench.core.spec.sensor import ChannelKind, SensorSpec, Statement
+from tactbench.core.spec.sensor import ChannelKind, PhysicalRange, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
 from tactbench.core.tables.text_table import TextTable
 
@@ -34,58 +33,48 @@ class Fact(NamedTuple):
     reference: str = ""
 
 
-class Property(NamedTuple):
-    """A row of the comparison: a title, and one fact for each sensor."""
-
-    title: str
-    facts: tuple[Fact, ...]
+Comparison = dict[str, list[Fact]]
+"""Rows of a comparison by title: one fact for each sensor."""
 
 
-def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
-    """Return the paper's Table I for any sensors."""
-    looks: dict[str, Callable[[SensorSpec], Fact]] = {
-        "# taxels": _number_of_taxels,
-        "measurement principle": lambda sensor: _fact(sensor.principle, sensor.principle_source),
+def table_one(sensors: Sequence[SensorSpec]) -> Comparison:
+    """Return the rows of the paper's Table I for any sensors."""
+    found = {
+        "# taxels": list(map(_number_of_taxels, sensors)),
+        "measurement principle": [_fact(sensor.principle, sensor.principle_source) for sensor in sensors],
     }
-    looks |= {title: partial(_range, kind=kind, which=which) for title, kind, which in _TABLE_ONE}
-    return _properties(sensors, looks)
+    return found | {title: [_range(one, kind, which) for one in sensors] for title, kind, which in _TABLE_ONE}
 
 
-def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
+def data_sheets(sensors: Sequence[SensorSpec]) -> Comparison:
     """Return the sensors as devices: range, size, mass, interface, power, availability."""
-    return _properties(sensors, {name.replace("_", " "): partial(_of_device, name=name) for name in OF_DEVICES})
+    return {name.replace("_", " "): [_of_device(sensor, name) for sensor in sensors] for name in OF_DEVICES}
 
 
-def readings(sensors: Sequence[SensorSpec]) -> list[Property]:
-    """Return what the specs state of readings: clocks, delay, range of a converter."""
-    return _properties(sensors, {"streams": _streams, "delay of a reading": _delay, "taxel reading": _reading})
+def readings(sensors: Sequence[SensorSpec]) -> Comparison:
+    """Return the facts about readings: clocks, delay, range of a converter."""
+    rows = {"streams": _streams, "delay of a reading": _delay, "taxel reading": _reading}
+    return {title: list(map(row, sensors)) for title, row in rows.items()}
 
 
-def quantities(sensors: Sequence[SensorSpec]) -> list[Property]:
+def quantities(sensors: Sequence[SensorSpec]) -> Comparison:
     """Return every quantity that the specs state: skin, parameters, noise, nuisances."""
     tables = list(map(_quantities, sensors))
     titles = dict.fromkeys(title for table in tables for title in table)
-    rows = ((title, [table.get(title) for table in tables]) for title in titles)
-    return [Property(title, tuple(_fact(one, one.source if one else None) for one in row)) for title, row in rows]
+    return {title: [_sourced(table.get(title)) for table in tables] for title in titles}
 
 
-def sensor_table(
-    title: str, sensors: Sequence[SensorSpec], properties: Iterable[Property], *, with_source: bool
-) -> TextTable:
-    """Return properties as a table with a column for each sensor, and one for its sources if wanted."""
+def sensor_table(title: str, sensors: Sequence[SensorSpec], rows: Comparison, *, with_source: bool) -> TextTable:
+    """Return a comparison as a table with a column for each sensor, and one for its sources if `with_source`."""
     columns = [name for one in sensors for name in (one.title, *([f"{one.title}: source"] if with_source else []))]
     lines = []
-    for row in properties:
-        line = [row.title]
-        for fact in row.facts:
+    for name, facts in rows.items():
+        line = [name]
+        for fact in facts:
             source = ": ".join(filter(None, (fact.tag, fact.reference)))
             line += [fact.text, source] if with_source else [fact.text]
         lines.append(tuple(line))
     return TextTable(title, ("", *columns), tuple(lines))
-
-
-def _properties(sensors: Sequence[SensorSpec], looks: Mapping[str, Callable[[SensorSpec], Fact]]) -> list[Property]:
-    return [Property(title, tuple(map(look, sensors))) for title, look in looks.items()]
 
 
 def _fact(stated: object, source: Source | None = None) -> Fact:
@@ -93,9 +82,12 @@ def _fact(stated: object, source: Source | None = None) -> Fact:
     return Fact(text, source.tag, source.reference) if source else Fact(text)
 
 
+def _sourced(stated: Quantity | PhysicalRange | None) -> Fact:
+    return _fact(stated, stated.source if stated else None)
+
+
 def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
-    found = next((one for one in (getattr(channel, which) for channel in sensor.channels(kind)) if one), None)
-    return _fact(found, found.source if found else None)
+    return _sourced(next((one for one in (getattr(channel, which) for channel in sensor.channels(kind)) if one), None))
 
 
 def _number_of_taxels(sensor: SensorSpec) -> Fact:
@@ -119,7 +111,7 @@ def _streams(sensor: SensorSpec) -> Fact:
 
 
 def _delay(sensor: SensorSpec) -> Fact:
-    """Return the parts of an answer's delay that are the sensor's own: an interval of each stream, and the link."""
+    """Return the sensor's own parts of an answer's delay: the interval of each stream, and the link."""
     parts = [f"{stream.name} {1e3 / stream.rate_hz:.3g} ms" for stream in sensor.streams if stream.rate_hz]
     sampling = f"sampling interval {', '.join(parts) or 'not stated'}"
     link = sensor.link_delay

@@ -7,10 +7,10 @@ import json
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import tactbench
 from tactbench.core.errors import UsageError
@@ -27,40 +27,32 @@ from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.published import published_table, reproduce
 from tactbench.core.report.results import MOST_CELLS, Results, SavedFigure, Section
 from tactbench.core.tables.text import command_line
-from tactbench.core.tables.text_table import WORDY, TextTable, sort_value
-
-if TYPE_CHECKING:
-    from jinja2 import Template
-    from markupsafe import Markup
-
+from tactbench.core.tables.text_table import WORDY, sort_value
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 
 def answers_section(results: Results) -> Section:
-    """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
-    verdicts = (
+    """Return the first section: the outcome of each block, and published scores and ours in one picture."""
+    verdicts = [
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
         for one in results.leaderboard.blocks
         if one.verdict
-    )
+    ]
     published = [line.verdict for line in reproduce(results.registry, results.rows)]
     inside, judged = published.count("inside"), sum(verdict in ("inside", "outside") for verdict in published)
-    paragraphs = (
-        "SIM: simulated by a twin of the sensor; no sensor was touched."
-        * any(row["simulated"] for row in results.rows),
-        f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
-        *verdicts,
-    )
+    counts = [f"Published numbers in the interval of ours: {inside} of {judged}."] if judged else []
+    simulated = ["SIM: simulated by a twin of the sensor; no sensor was touched."]
+    simulated = simulated if any(row["simulated"] for row in results.rows) else []
     pictures = tuple(one for one in results.drawn if one.name == PUBLISHED)
-    return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)
+    return Section(paragraphs=(*simulated, *counts, *verdicts), pictures=pictures)
 
 
 def leaderboards_section(results: Results) -> Section:
-    """Return the section of leaderboards, failed and skipped cells with their reasons."""
+    """Return the section of leaderboards, with failed and skipped cells and their reasons."""
     view = View(columns=(*DEFAULT, REASON))
     tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in results.leaderboard.blocks)
-    return Section(paragraphs=("A number leads to everything that is known about its cell.",), tables=tables)
+    return Section(paragraphs=("A number leads to the details of its cell.",), tables=tables)
 
 
 def published_section(results: Results) -> Section:
@@ -70,7 +62,7 @@ def published_section(results: Results) -> Section:
 
 
 def figures_section(results: Results) -> Section:
-    """Return the section of figures: those that were drawn for this page."""
+    """Return the section of the figures that were drawn for this page."""
     pictures = tuple(one for one in results.drawn if one.name != PUBLISHED)
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
     return Section(paragraphs=paragraphs, pictures=pictures, missing=results.undrawn)
@@ -82,35 +74,38 @@ def compared_section(results: Results) -> Section:
 
 
 def costs_section(results: Results) -> Section:
-    """Return the section of what `tactbench cost` has left in the folder."""
+    """Return the section of the files that `tactbench cost` has written."""
     folder = results.store.folder / "cost"
     tables = []
     for path in sorted(folder.glob("*.json")):
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
             tables.append(trade_table(json.loads(path.read_bytes())))
-    pictures = (SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
+    pictures = (SavedFigure(path.stem, path.stem, "As drawn by `tactbench cost`.", path)
                 for path in sorted(folder.glob("*.png")))  # fmt: skip
     return Section(tables=tuple(tables), pictures=tuple(pictures))
 
 
 def assumptions_section(results: Results) -> Section:
-    """Return the section of what `tactbench sensitivity` has left in the folder."""
+    """Return the section of what `tactbench sensitivity` has computed."""
     specs = {sensor.name: sensor.spec for sensor in results.registry.sensors}
     return Section(tables=tuple(sensitivity_tables(results.store, specs)))
 
 
 def sensors_section(results: Results) -> Section:
-    """Return the comparison of the sensors that the results are about."""
+    """Return the comparison of the sensors of the results."""
     known = results.registry.sensors
     names = list(dict.fromkeys(str(row["sensor"]) for row in results.rows))
-    specs = [known[name].spec for name in names if name in known]
-    command = command_line("tactbench", "show", *(name for name in names if name in known), "--all")
+    missing = tuple(f"{name}: not installed." for name in names if name not in known)
+    names = [name for name in names if name in known]
+    if not names:
+        return Section(missing=missing)
+    specs = [known[name].spec for name in names]
     table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
+    command = command_line("tactbench", "show", *names, "--all")
     return Section(
-        paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
-        tables=(table,) if specs else (),
-        missing=tuple(f"{name}: not installed." for name in names if name not in known),
-    )
+        paragraphs=(f"All parameters of these sensors with their sources: `{command}`.",), tables=(table,),
+        missing=missing,
+    )  # fmt: skip
 
 
 def cells_section(results: Results) -> Section:
@@ -119,18 +114,18 @@ def cells_section(results: Results) -> Section:
         return Section(paragraphs=(f"These are more than {MOST_CELLS} cells: `tactbench why CELL` has their details.",))
     several = any(row["repeats"] > 1 for row in results.rows)
     paragraphs = ("Of several replicates, key, recordings, candidates and effects are those of the first.",) * several
-    found = tuple(details(line.row, results) for line in results.leaderboard.lines)
+    rows = [line.row for line in results.leaderboard.lines]
+    found = tuple(details(row, results.answers(row).get("test")) for row in rows)
     return Section(paragraphs=paragraphs, details=found)
 
 
 def about_section(results: Results) -> Section:
-    """Return how many cells ended with each status, and the versions, machine and commit of the runs."""
+    """Return the number of cells of each status, and the versions, machine and commit of the runs."""
     counts = Counter(str(row["status"]) for row in results.rows)
     statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     return Section(paragraphs=(f"Cells: {statuses}.", *results.leaderboard.footer))
 
 
-# Anchor, title and maker of each section: a section that cannot be made says so under its own title.
 SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("answers", "What came out", answers_section),
     ("leaderboards", "Leaderboard", leaderboards_section),
@@ -143,23 +138,27 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("cells", "Details of each cell", cells_section),
     ("about", "Made by", about_section),
 )
+"""Anchor, title and maker of each section."""
 
 
 class Page(NamedTuple):
-    """The HTML of a page, and what is missing from it."""
+    """The HTML of a page, and the parts that it lacks."""
 
     html: str
     missing: tuple[str, ...]
-    """One sentence for each thing that a section lacks."""
+    """A sentence for each part that a section lacks."""
     broken: tuple[str, ...]
-    """One sentence for each section that could not be made although its results exist."""
+    """A sentence for each section that could not be made although its results exist."""
 
 
 def make_page(results: Results) -> Page:
-    """Return the page: the same results give the same bytes. Sections without anything are left out.
+    """Return the page; the same results give the same bytes. Empty sections are left out.
 
-    A section that cannot be made takes no other with it: it says why.
+    A section that cannot be made is replaced by the reason.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
     sections: list[Section] = []
     broken: list[str] = []
     for anchor, title, make in SECTIONS:
@@ -172,45 +171,19 @@ def make_page(results: Results) -> Page:
         if section != Section():
             sections.append(replace(section, anchor=anchor, title=title))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
-    html = _template().render(
-        title=TITLE,
-        version=tactbench.__version__,
-        sections=sections,
-        anchors=results.anchors,
-        style=_text("page.css"),
-        script=_text("page.js"),
-    )
+    loader = PackageLoader("tactbench.core.report", "template")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    environment.filters.update(sort_value=sort_value, picture=lambda path: base64.b64encode(path.read_bytes()).decode())
+    template = resources.files("tactbench.core.report") / "template"
+    style, script = (Markup((template / name).read_text(encoding="utf-8")) for name in ("page.css", "page.js"))
+    html = environment.get_template("page.html").render(
+        title=TITLE, version=tactbench.__version__, sections=sections, anchors=results.anchors, wordy=WORDY,
+        style=style, script=script,
+    )  # fmt: skip
     return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))
 
 
-def _template() -> Template:
-    """Return the template; everything that it is given is escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    loader = PackageLoader("tactbench.core.report", "template")
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    environment.globals["wordy"] = WORDY
-    environment.filters.update(sort_value=sort_value, picture=lambda path: base64.b64encode(path.read_bytes()).decode())
-    return environment.get_template("page.html")
-
-
-def _text(name: str) -> Markup:
-    from markupsafe import Markup
-
-    return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
-
-
-@dataclass(frozen=True)
-class Report:
-    """A report that has been written, and what is missing from it."""
-
-    page: Path
-    reproduction: TextTable
-    missing: tuple[str, ...]
-    broken: tuple[str, ...]
-
-
-def make_report(results: Results, out: Path, progress: Progress) -> Report:
+def make_report(results: Results, out: Path, progress: Progress) -> Page:
     """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
 
     Raises
@@ -218,7 +191,7 @@ def make_report(results: Results, out: Path, progress: Progress) -> Report:
     UsageError
         If no cell has finished.
     UnwritableError
-        If `out` refuses the page or the figures; an earlier page is then still whole.
+        If `out` cannot be written; an earlier page is then still whole.
     """
     if not any(row["status"] == "done" for row in results.rows):
         raise UsageError(
@@ -229,12 +202,7 @@ def make_report(results: Results, out: Path, progress: Progress) -> Report:
     with writable(out):
         (out / "figures").mkdir(parents=True, exist_ok=True)
         drawn = draw_figures(results, out / "figures", progress, undrawn.append)
-        html, missing, broken = make_page(replace(results, drawn=tuple(drawn), undrawn=tuple(undrawn)))
+        page = make_page(replace(results, drawn=tuple(drawn), undrawn=tuple(undrawn)))
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
-        replace_file(out / "index.html", html.encode("utf-8", "replace"))
-    return Report(
-        page=out / "index.html",
-        reproduction=published_table(results.registry, results.rows),
-        missing=missing,
-        broken=broken,
-    )
+        replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
+    return page

@@ -9,8 +9,7 @@ from typing import Any, Literal
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.replicates import against_reference
-from tactbench.core.tables.numbers import interval as ends
-from tactbench.core.tables.numbers import score, signed
+from tactbench.core.tables.numbers import interval, score, signed
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 Row = Mapping[str, Any]
@@ -20,7 +19,7 @@ COLUMNS = ("number", "published", "ours", "interval", "ours − published", "ver
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A published number, and one of our rows beside it."""
+    """A published number, and a row of ours that is comparable with it."""
 
     task: TaskSpec
     published: Published
@@ -39,7 +38,7 @@ class Reproduction:
 
 
 def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
-    """Return a line for each published number and each row that it may stand beside, tasks in the order of the rows."""
+    """Return a line for each published number and each comparable row, tasks in the order of the rows."""
     rows = list(map(against_reference, rows))
     tasks = [registry.tasks[name].spec for name in dict.fromkeys(row["task"] for row in rows) if name in registry.tasks]
     return [
@@ -52,7 +51,7 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
 
 
 def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
-    """Return whether `row` may be compared with a published number."""
+    """Return whether `row` is comparable with a published number."""
     if row["task"] != task.name or row["params"] or (published.estimator is None and row["is_baseline"]):
         return False
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
@@ -70,35 +69,32 @@ def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
 def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
     """Return the table of published numbers and ours."""
     lines = reproduce(registry, rows)
-    titles: dict[str, list[str]] = {}
+    titles: dict[str, dict[str, None]] = {}
     for line in lines:
         if line.published.remark:
-            titles.setdefault(line.published.remark, []).append(line.published.title or line.title)
-    notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
+            titles.setdefault(line.published.remark, {})[line.published.title or line.title] = None
     return text_table(
         "Published numbers, and ours",
         COLUMNS,
-        [_entries(line) for line in lines],
+        list(map(_entries, lines)),
         numeric=COLUMNS[1:5],
-        notes=notes,
+        notes=[f"{', '.join(whose)}: {remark}." for remark, whose in titles.items()],
         kinds=[line.verdict.replace(" ", "-") for line in lines],
     )
 
 
 def _entries(line: Reproduction) -> tuple[str, ...]:
     row, unit, published = line.row, line.task.unit, line.published.score
-    ours = interval = apart = ABSENT
-    if row["score"] is not None:
-        marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
-        ours = Entry(score(row["score"], unit) + marks, finite(row["score"]), cell=row["cell"])
-        interval = Entry(ends(row["ci_low"], row["ci_high"], unit), finite(row["ci_low"]))
-        apart = Entry(signed(row["score"] - published, unit), row["score"] - published)
-    digits = f"{published:g}" if unit == "1" else score(published, unit)
+    title = f"{line.title}; {line.published.reference}"
+    theirs = Entry(f"{published:g}" if unit == "1" else score(published, unit), published)
+    if row["score"] is None:
+        return (title, theirs, ABSENT, ABSENT, ABSENT, line.reason)
+    marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
     return (
-        f"{line.title}; {line.published.reference}",
-        Entry(digits, published),
-        ours,
-        interval,
-        apart,
-        line.reason or line.verdict,
+        title,
+        theirs,
+        Entry(score(row["score"], unit) + marks, finite(row["score"]), cell=row["cell"]),
+        Entry(interval(row["ci_low"], row["ci_high"], unit), finite(row["ci_low"])),
+        Entry(signed(row["score"] - published, unit), row["score"] - published),
+        line.verdict,
     )

@@ -16,7 +16,7 @@ class TerminalOperator:
     Parameters
     ----------
     yes
-        Whether all steps are done already, so that they are shown without waiting (``--yes``).
+        Show prompts without waiting, as all steps are done already (``--yes``).
     paused
         Context of a prompt, in which nothing else draws on the terminal: ``LiveView.paused``.
     """
@@ -42,14 +42,14 @@ class TerminalOperator:
                 hint="Run it in a terminal, or add --yes if all steps are done already.",
             )
         with self._paused():
-            _forget_typed()
+            _drop_input()
             remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
             if not sys.stdin.readline():
                 raise RigError("The step was not confirmed: stdin was closed.", hint="Press Enter when it is done.")
 
 
-def _forget_typed() -> None:
-    """Drop input that was typed before, where the system can."""
+def _drop_input() -> None:
+    """Discard input that was typed before, where the system can."""
     try:
         import termios
     except ImportError:  # Windows

@@ -1,4 +1,4 @@
-"""Opens result folders, and prints which of their files cannot be read."""
+"""Opens result folders, and reports files that cannot be read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactbench.core.tables.terminal import remark
 
 
 def is_results(folder: Path) -> bool:
-    """Return whether a folder holds cells that a run has ended."""
+    """Return whether a folder holds cells that have ended."""
     return any((folder / "cells").glob("*.h5"))
 
 
@@ -24,13 +24,7 @@ def opened(folder: Path) -> Store:
 
 
 def shown_rows(store: Store) -> list[Row]:
-    """Return a row for each cell of a folder, and print which files cannot be read.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
+    """Return a row for each cell of a folder, and report unreadable files; raises UsageError if no row is left."""
     rows = store.rows()
     for one in store.troubles:
         remark(f"Left out: {one}")

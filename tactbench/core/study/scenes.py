@@ -57,22 +57,16 @@ def _indenter(registry: Registry, text: str) -> Indenter:
 
 def _profile(registry: Registry, text: str) -> ForceProfile:
     name, given = _named(text)
-    if name == "ramp":
-        return _ramp(given)
-    descriptor = registry.profiles[name]
-    return force_path(descriptor, _in_units(given, descriptor.parameters), _BY)
-
-
-def _ramp(given: Mapping[str, float]) -> ForceProfile:
+    if name != "ramp":
+        descriptor = registry.profiles[name]
+        return force_path(descriptor, _in_units(given, descriptor.parameters), _BY)
     ramp = ForceRamp()
-    change: dict[str, Any] = {}
-    for name, value in given.items():
-        if name not in ("force", "duration"):
-            raise UnknownNameError("parameter of the ramp", name, ("force", "duration"))
+    for parameter, value in given.items():
+        if parameter not in ("force", "duration"):
+            raise UnknownNameError("parameter of the ramp", parameter, ("force", "duration"))
         if not value > 0:
-            raise UsageError(f"{name} of the ramp is {value:g}.", hint="Give a number above 0.")
-    if "force" in given:
-        change["end"] = sourced(given["force"], "N", _BY)
+            raise UsageError(f"{parameter} of the ramp is {value:g}.", hint="Give a number above 0.")
+    change: dict[str, Any] = {"end": sourced(given["force"], "N", _BY)} if "force" in given else {}
     if "duration" in given:
         share = given["duration"] / ramp.duration.to("s")
         change["duration"] = sourced(given["duration"], "s", _BY)
@@ -92,7 +86,7 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
         except ValueError as error:
             raise UsageError(
                 f"{field.strip()} of {name!r} is given as {number!r}, and a number is expected.",
-                hint="Write it as radius=4; `tactbench show` with the name says in which unit.",
+                hint="Write it as radius=4; `tactbench show` with the name shows the units.",
             ) from error
     return name.strip(), given
 

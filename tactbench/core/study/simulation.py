@@ -1,4 +1,4 @@
-"""How a simulated rig carries out its scenes: the effects, nuisances, rung and tolerance that options set."""
+"""Options of a simulated rig: effects, nuisances, rung and tolerance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,10 @@ _NAMED = ("rung", "scenario")
 
 
 def simulation_of(
-    registry: Registry,
-    rig: str,
-    sensors: Sequence[str],
-    effects: str | None,
-    settings: Iterable[str] = (),
+    registry: Registry, rig: str, sensors: Sequence[str], effects: str | None, settings: Iterable[str] = (),
     stated: Simulation = Simulation(),  # noqa: B008  (it never changes)
-) -> Simulation:
-    """Return the simulation that --effects and --set describe, laid over what a file states.
+) -> Simulation:  # fmt: skip
+    """Return the simulation of a file with the values of --effects and --set.
 
     Raises
     ------

@@ -39,7 +39,7 @@ Words = Annotated[
 
 
 class Study(Frozen):
-    """The options of ``tactbench run``. The matrix file decides what they leave open."""
+    """The options of ``tactbench run``; the matrix file has the values of those that are not given."""
 
     sensor: Words = ()
     task: Words = ()
@@ -68,7 +68,7 @@ class Study(Frozen):
 
 
 def carry_out(study: Study) -> tuple[Store, Outcome]:
-    """Run a study and show the progress; return the result folder and how cells ended.
+    """Run a study and show the progress; return the result folder and the outcome of its cells.
 
     Raises as `matrix_of` and `tactbench.core.matrix.run.run_matrix` do.
     """
@@ -85,7 +85,7 @@ def carry_out(study: Study) -> tuple[Store, Outcome]:
 
 
 def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
-    """Return the matrix of the file, with the options of the study laid over it.
+    """Return the matrix of the file with the options of the study.
 
     Raises
     ------
@@ -93,13 +93,14 @@ def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
         If a file, a name or a combination of options is wrong.
     """
     matrix = matrix_called(study.config or ("real" if study.dataset else None))
-    change: dict[str, Any] = {"rig": matrix.rig or registry.first_rig("simulated")}
+    simulated, replays = registry.first_rig("simulated"), registry.first_rig("replays")
+    change: dict[str, Any] = {"rig": matrix.rig or simulated}
     over: dict[str, Any] = {}
-    if study.dataset and (study.recordings or study.rig_file or study.rig not in (None, registry.first_rig("replays"))):
+    if study.dataset and (study.recordings or study.rig_file or study.rig not in (None, replays)):
         raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings and --rig-file.")
     if study.rig or study.recordings or study.rig_file or study.dataset:
         file = load_yaml(study.rig_file, RigFile) if study.rig_file else None
-        change["rig"] = study.rig or (file.rig if file else registry.first_rig("replays"))
+        change["rig"] = study.rig or (file.rig if file else replays)
         change["rig_file"] = study.rig_file and str(study.rig_file)
         if change["rig"] != matrix.rig:
             change["sensors"] = tuple(file.sensors) if file else ()  # the matrix' sensors are those of its own rig
@@ -118,15 +119,15 @@ def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
         known = {name: [choice for choice in matrix.tasks if choice.name == name] for name in study.task}
         tasks = [one for name, choices in known.items() for one in choices or [TaskChoice(name=name)]]
     chosen = [choice.model_copy(update=over) for choice in tasks or matrix.tasks]
-    matrix = matrix.model_copy(update={**change, "tasks": tuple(_with_those_beside(chosen, registry))})
-    simulation = simulation_of(
-        registry, matrix.rig, matrix.sensors, effects=study.effects, settings=study.set, stated=matrix.simulation
-    )
-    return matrix.model_copy(update={"simulation": simulation})
+    change["tasks"] = tuple(_with_those_beside(chosen, registry))
+    matrix = matrix.model_copy(update=change)
+    change = {"simulation": simulation_of(registry, matrix.rig, matrix.sensors, study.effects, study.set,
+                                          matrix.simulation)}  # fmt: skip
+    return matrix.model_copy(update=change)
 
 
 def _of_datasets(study: Study, matrix: MatrixSpec) -> list[TaskChoice]:
-    """Return the tasks of each data set: the study's, with the options of the matrix, or else those it is meant for."""
+    """Return the tasks of each data set: the study's with the options of the matrix, or else those of the data set."""
     from tactbench.core.recording.datasets import dataset_called
 
     found = []

@@ -14,12 +14,6 @@ def score(value: float | None, unit: str) -> str:
     return f"{value:.3f}" if unit == "1" else f"{value:.4f}" if -10 < value < 10 else f"{value:.2f}"
 
 
-def coarse(value: float | None, unit: str) -> str:
-    """Return a score with a decimal less: for the range of single scores."""
-    text = score(value, unit)
-    return text if value is None else f"{value:.{len(text.partition('.')[2]) - 1}f}"
-
-
 def interval(low: float | None, high: float | None, unit: str) -> str:
     """Return an interval in the digits of its score; one that the data do not bound above is open."""
     return ABSENT if low is None else f"{score(low, unit)} … {'open' if high is None else score(high, unit)}"

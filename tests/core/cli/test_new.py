@@ -101,6 +101,6 @@ def test_the_sensor_runs_with_the_estimator_and_the_effect_and_the_task_on_the_r
 def test_nothing_is_overwritten(verbs, tmp_path):
     (tmp_path / "README.md").write_text("mine")
     done = verbs("new", "task", "mine", code=2)
-    assert "README.md is there already" in done.stderr
+    assert "README.md" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
     assert (tmp_path / "README.md").read_text() == "mine"

@@ -16,21 +16,8 @@ from tests.core.matrix.test_evil_cells import ASKED
 from tests.core.pool.patience import ending, processes_in, until
 
 COMMAND = [sys.executable, "-m", "tactbench"]
-RUN = (
-    "run",
-    "--sensor",
-    "ideal",
-    "--task",
-    "force",
-    "--estimator",
-    "ols",
-    "--repeats",
-    "3",
-    "--jobs",
-    "1",
-    "--out",
-    "out",
-)
+RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--repeats", "3", "--jobs", "1",
+       "--out", "out")  # fmt: skip
 DROPPED = """
 import os, sys
 from tactbench.core.interrupts import end_alike
@@ -63,8 +50,9 @@ def nothing_left(folder):
     return not processes_in(folder) and not list((folder / "tmp").iterdir())
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("begun", ["recordings/**/*.h5*", "cells/[!.]*.h5"])
+@pytest.mark.parametrize(
+    ("number", "begun"), [(signal.SIGTERM, "recordings/**/*.h5*"), (signal.SIGHUP, "cells/[!.]*.h5")]
+)
 def test_a_run_ends_with_a_message_and_leaves_nothing_but_what_was_finished(there, number, begun):
     folder, how = there
     with ending([*COMMAND, *RUN], **how) as run:
@@ -105,12 +93,12 @@ def test_ctrl_c_at_the_terminal_ends_the_workers_of_dask_without_a_traceback(the
     assert until(lambda: nothing_left(folder)), [*processes_in(folder), *(folder / "tmp").rglob("*")]
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
-def test_output_that_is_closed_is_no_error(there, closed):
+def test_output_that_is_closed_is_no_error(there):
     folder, how = there
     presses(folder / "shelf")
-    for words in (("list",), (*ASKED, "--estimator", "ols", "--out", "out")):
+    run = (*ASKED, "--estimator", "ols", "--out", "out")
+    for closed, words in ((">&-", ("list",)), ("2>&-", ("list",)), ("<&- >&- 2>&-", run)):
         with ending(["sh", "-c", f'"$@" {closed}', "sh", *COMMAND, *words], **how) as verb:
-            said, told = verb.communicate(timeout=60)
-        assert (verb.returncode, "Traceback" in said + told) == (0, False), told
+            out, err = verb.communicate(timeout=60)
+        assert (verb.returncode, "Traceback" in out + err) == (0, False), err
     assert {row["status"] for row in Store(folder / "out").rows()} == {"done"}

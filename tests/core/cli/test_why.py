@@ -6,6 +6,7 @@ import shutil
 import pytest
 
 from tests.conftest import Verbs
+from tests.core.cli.terminals import computed
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator",
@@ -45,15 +46,15 @@ def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
     assert (found["cell"], found["answer"], found["reasons"], found["status"]) == (ACME, "hit", [], "done")
     assert (here.folder / found["file"]).is_file()
     assert all((here.folder / "results" / path).is_file() for path in found["recordings"])
-    assert found["try"] == f"tactbench why {ACME} --again --out results"
-    assert ACME in here("why", "ideal/force", code=2).stderr, "a part of several names"
-    assert "Did you mean" in here("why", ACME.replace("karl", "carl"), code=2).stderr
+    assert found["try"].split()[2:4] == [ACME, "--again"]
+    for part in ("ideal/force", ACME.replace("karl", "carl")):  # a part of several names, a misspelt one
+        assert ACME in here("why", part, code=2).stderr
 
 
 def test_the_words_and_the_run_agree(here):
     filters = here.folder / "site" / "acme" / "filters.py"
     original = filters.read_text()
-    assert "3 of 4 answers were found finished" in here(*RUN, code=1).stderr
+    assert computed(here(*RUN, code=1))[:2] == [3, 4]
     filters.write_text("LAW = 0.5\n")
     found = why(here)
     assert found["answer"] == "miss"
@@ -62,7 +63,7 @@ def test_the_words_and_the_run_agree(here):
     again = why(here, ACME, "--again", code=1)
     assert any(difference.startswith("score ") for difference in again["differences"])
     assert again["circumstances"] == [reason]
-    assert "2 of 4 answers were found finished" in here(*RUN, code=1).stderr
+    assert computed(here(*RUN, code=1))[:2] == [2, 4]
     assert why(here)["answer"] == "hit"
     filters.write_text(original)  # back as it was: the first result is still there
     assert why(here)["answer"] == "hit"
@@ -73,7 +74,7 @@ def test_a_recording_that_was_removed_or_replaced_is_named(here):
     (other,) = (here.folder / "results" / "recordings" / "ideal").glob("flat-train-*.h5")
     flat.unlink()
     (reason,) = why(here)["reasons"]
-    assert reason.startswith(f"1 of 3 recordings have to be made, {flat.stem} first")
+    assert flat.stem in reason
     shutil.copy(other, flat)
     (reason,) = why(here)["reasons"]
     assert reason.startswith(f"data: {flat.stem} ")
@@ -83,7 +84,7 @@ def test_a_recording_that_was_removed_or_replaced_is_named(here):
 def test_a_stopped_cell_shows_where_and_fails_again(here):
     found = why(here, "acme-raises")
     assert (found["answer"], found["status"]) == ("miss", "failed")
-    assert "the pad came off" in found["reason"]
+    assert "came off" in found["reason"]
     assert "raise RuntimeError" in here("why", "acme-raises").stdout
     again = why(here, "acme-raises", "--again", code=1)
     assert (again["status"], again["differences"]) == ("failed", [])

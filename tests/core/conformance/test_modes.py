@@ -71,11 +71,11 @@ def test_one_that_crashes_fails_its_check_and_ends_nothing(monkeypatch):
     assert "not tried, for answers-have-the-shape has not passed" in {one.text for one in report.of("skipped")}
 
 
-def test_reading_a_recording_imports_no_code_of_the_plugin(verbs, tmp_path):
+def test_a_recording_is_checked_beside_the_plugin(verbs, tmp_path):
     path = written(tmp_path / "press.h5", "in grams")
     done = verbs("check", "icub", "--recording", str(path), "--format", "json", code=1)
     (report,) = json.loads(done.stdout)["checked"]
-    assert report["modes"] == ["recording"]
+    assert report["modes"] == ["passive", "recording"]
     assert [one["check"] for one in report["checks"] if one["status"] == "failed"] == ["recording-fits-the-spec"]
 
 

@@ -22,10 +22,6 @@ def here(monkeypatch, tmp_path):
     make_here(monkeypatch)
 
 
-def scaled(X, force):
-    X[:, 1] = 3 - 40 * force
-
-
 def squared(X, force):
     X[:, 1] = force**2
 
@@ -38,12 +34,8 @@ def repeated(X, force):
     X[::6], force[::6] = ramp(9, n=20)  # the same in every session
 
 
-PLANTED = {
-    scaled: "t1 is but for rounding a monotone function of the target",
-    squared: "t1 is but for rounding a monotone function of the target",
-    lagged: "t1 is but for rounding a monotone function of the target",
-    repeated: "17% of the test rows of a fold are equal to training rows",
-}
+PLANTED = {squared: "t1 ", lagged: "t1 ", repeated: "17%"}
+"""Beginning of the stamp of each leak."""
 
 
 @pytest.mark.parametrize("plant", [None, *PLANTED])
@@ -58,7 +50,7 @@ def test_a_planted_leak_is_named_in_the_main_table(tmp_path, plant):
     (line,) = [line for line in repr(found).splitlines() if " ols " in line and " made " in line]
     notes = [" ".join(note.split()) for note in repr(found).split("\n\n") if "‡  leaks" in note]
     assert ("‡" in line) == bool(notes) == (plant is not None)
-    assert all(PLANTED[plant] in note for note in notes)
+    assert all(f"leaks: {PLANTED[plant]}" in note for note in notes)
 
 
 def test_what_the_first_frame_gives_away_is_said_in_every_format(tmp_path):

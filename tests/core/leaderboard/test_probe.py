@@ -64,26 +64,7 @@ def test_nothing_is_shown_where_nothing_was_probed():
 
 
 def test_a_probe_that_makes_no_sense_says_why():
-    skipped = classed(0.0, "first-frame", split=None, status="skipped", reason="Each is one reading.") | {"score": None}
+    skipped = classed(0.0, "first-frame", split=None, status="skipped", reason="One.") | {"score": None}
     table = build_probe([classed(0.9), skipped])
-    assert table.lines[0][table.columns.index("first frame alone")] == "skipped"
-    assert table.notes[-1] == "a/question: Each is one reading."
-
-
-@pytest.mark.parametrize(
-    ("scores", "says"),
-    [
-        ({"mean": 10.0, "time-index": 0.9}, "TRIVIAL"),
-        ({"time-index": 1.1, "mean": 10.0}, "TRIVIAL?"),
-        ({"mean": 10.0, "time-index": 3.0}, "no leak shown"),
-    ],
-)
-def test_the_best_of_all_trivial_answers_is_looked_at(scores, says):
-    trivial = [erring(value, estimator=name, is_baseline=True) for name, value in scores.items()]
-    elsewhere = erring(0.1, estimator="mean", is_baseline=True, split="press")
-    table = build_probe([erring(1.0), erring(1.2, split="shuffled"), *trivial, elsewhere])
-    (line,) = table.lines
-    assert line[-1] == says
-    assert table.kinds == ("alarm" if says == "TRIVIAL" else "plain",)
-    best = min(scores, key=scores.get)
-    assert line[table.columns.index("trivial")] == f"{scores[best]:.4f} {best}"
+    assert "skipped" in table.lines[0]
+    assert table.notes[-1] == "a/question: One."

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError
-from tactbench.core.leaderboard.levels import OTHER_VERSION, write_level
 from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store
 
@@ -136,12 +135,11 @@ def test_what_stands_in_the_way_is_named_and_nothing_is_left(tmp_path):
         merge([tmp_path / "empty"], folder)
 
 
-def test_the_verb_writes_the_tables_that_leaderboard_shows_with_levels(verbs):
+def test_the_verb_writes_the_tables_that_leaderboard_shows(verbs):
     for seed, name in ((1, "one"), (2, "two")):
         holding(verbs.folder / name, f"icub/force/twin/karl2016/mean/{seed}", seed=seed)
-    write_level(verbs.folder / "two", "icub", {"level": "silver"})
     assert verbs("merge", "one", "two", "--out", "both").stdout == "both\n"
     written = (verbs.folder / "both" / "leaderboard.json").read_text()
     (line,) = json.loads(written)
-    assert (line["n_replicates"], line["repeats"], line["shown"]["level"]) == (2, 2, OTHER_VERSION)
+    assert (line["n_replicates"], line["repeats"]) == (2, 2)
     assert verbs("leaderboard", "both", "--format", "json").stdout == written

@@ -33,7 +33,7 @@ ITERATIONS = 1000
 
 
 def confusion(group: Group) -> Sketch:
-    """Draw confusion matrices, one row a sensor: left of the validation set, if there is one, right of the test set."""
+    """Draw confusion matrices, one row for each sensor: left the validation set, if there is one, right the test."""
     shown = group.panels
     roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
@@ -91,7 +91,7 @@ def class_name(one: Any) -> str:
 
 
 def embedding(group: Group) -> Sketch:
-    """Draw the t-SNE of the features that an estimator saw, one row a sensor: left by class, right by force.
+    """Draw the t-SNE of the features that an estimator read, one row for each sensor: left by class, right by force.
 
     Raises
     ------
@@ -123,8 +123,8 @@ def embedding(group: Group) -> Sketch:
     legend(figure, axes[:, 0], ncols=6, title=title, markerscale=1.8, handletextpad=0.1, columnspacing=0.8)
     points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
     caption = (
-        f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by the force "
-        f"that the reference read (lighter points are more force). Test rows shown: {points}; perplexity "
+        f"t-SNE of the test set's features as the estimator read them; left by {group.quantity}, right by the force "
+        f"of the reference (lighter points are more force). Test rows shown: {points}; perplexity "
         f"{PERPLEXITY:g} or a third of the points, {ITERATIONS} iterations from the principal components, seed "
         f"{group.row['seed']}. Near points look alike to the estimator; distances between clusters, their sizes and "
         "the axes mean little."
@@ -133,7 +133,7 @@ def embedding(group: Group) -> Sketch:
 
 
 def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArray, FloatArray]:
-    """Return (points,) rows of a cell's test set and (points, 2) the t-SNE [1]_ of what its estimator saw of them.
+    """Return (points,) rows of a cell's test set and (points, 2) the t-SNE [1]_ of their features.
 
     Raises
     ------
@@ -144,8 +144,8 @@ def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[Int
 
     Notes
     -----
-    Every n-th row, n the smallest that leaves at most `AT_MOST`. Computed on one thread, since the order of summation
-    decides the last bits and t-SNE is chaotic.
+    Every n-th row, n the smallest that leaves at most `AT_MOST`. Computed on one thread, since t-SNE is chaotic and the
+    order of summation changes the last bits.
 
     References
     ----------
@@ -165,7 +165,7 @@ def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[Int
 
 
 def _features(results: Results, row: dict[str, Any], test: Answers) -> FloatArray:
-    """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
+    """Return (n, features) of the test set as the estimator read them: kept, scaled and filtered by the protocol."""
     task = results.registry.tasks[row["task"]].spec
     estimator = results.registry.estimators[row["estimator"]]
     paths = results.recordings(row)

@@ -1,4 +1,4 @@
-"""Draws every figure that a result folder can serve; one that cannot be made stops no other."""
+"""Draws every figure of a result folder; one that cannot be made stops no other."""
 
 from __future__ import annotations
 
@@ -21,45 +21,39 @@ FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
     "vector": (residuals,),
     "classification": (confusion, embedding),
 }
-"""Figures by kind of task, in the order of a report; each raises NotApplicable if it cannot show a group."""
+"""Figures by kind of task, in the order of a report; NotApplicable is raised for a group that has no such figure."""
 
 
 def draw_figures(
     results: Results, folder: Path, progress: Progress, remark: Callable[[str], None]
 ) -> list[SavedFigure]:
-    """Draw and save every figure that the results can serve, as PDF and PNG.
+    """Draw every figure that the results allow and save it into `folder` as PDF and PNG.
 
-    Parameters
-    ----------
-    folder
-        Where the files go. Nothing else is written into it.
-    remark
-        Called with a sentence on each figure that is left out.
+    `remark` is called with a sentence on each figure that is left out.
 
     Returns
     -------
     list of SavedFigure
-        In the order of a report: published scores and ours, then by group of comparable cells, as the cells come.
+        In the order of a report: published scores and ours, then by group of comparable cells.
     """
-    work: list[tuple[str, Callable[[], Sketch | None]]] = []  # what is drawn, and by what
+    work: list[tuple[str, Callable[[], Sketch | None]]] = []
     for group in groups(results, remark):
         kind = "vector" if isinstance(group.task.target, VectorTarget) else group.task.kind
-        for draw in FIGURES.get(kind, ()):
-            where = f"of {group.task.name} under {group.row['protocol']}, split {group.row['split']}"
-            work.append((f"{draw.__name__.replace('_', ' ')} {where}", partial(draw, group)))
+        where = f"of {group.task.name} under {group.row['protocol']}, split {group.row['split']}"
+        work += [(f"{draw.__name__.replace('_', ' ')} {where}", partial(draw, group)) for draw in FIGURES.get(kind, ())]
     if work:
         work.insert(0, ("picture of published scores and ours", partial(draw_published, results)))
     drawn: list[SavedFigure] = []
     progress.begin("drawing", len(work))
     with styled():
-        for what, make in work:
-            progress.working(what)
+        for name, draw in work:
+            progress.working(name)
             try:
-                sketch = make()
+                sketch = draw()
                 if sketch is not None:
                     picture = save(sketch.figure, folder / sketch.name)
                     drawn.append(SavedFigure(sketch.name, sketch.title, sketch.caption, picture))
             except Exception as error:  # stops no other figure
-                remark(f"No {what}: {error_text(error)}")
-            progress.advance(what)
+                remark(f"No {name}: {error_text(error)}")
+            progress.advance(name)
     return drawn

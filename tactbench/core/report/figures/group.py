@@ -96,12 +96,12 @@ class Group:
         return target.unit if isinstance(target, LabelTarget) else self.task.unit
 
     def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
-        """Return the group's figure of a kind, with a heading, and what its marks mean in the caption."""
+        """Return the group's figure of a kind with its heading; the caption ends with an explanation of its marks."""
         row = self.row
         words = [kind, row["task"], row["protocol"], row["split"], answer_name(row)]
         words += [] if row["simulated"] else [row["rig"]]
         name = re.sub(r"[^a-z0-9]+", "-", "-".join(filter(None, words)).lower()).strip("-")
-        # Of several replicates, or of several seeds of the same recordings, a figure of single answers shows one.
+        # A figure of single answers shows one of several replicates.
         shown = f"replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
         heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
         if row["split"] not in (None, "roles"):
@@ -121,33 +121,30 @@ def with_unit(words: str, unit: str) -> str:
 def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
     """Return the groups of finished cells, one for each set of figures.
 
-    Of several estimators the one that stands beside a published number is shown, or else the one with the best score
-    of any sensor; of several replicates the one whose answers the cell's row leads to. `remark` is called with a
+    Of several estimators, the one that is comparable with a published number is shown, or else the one with the best
+    score; of several replicates, the one whose answers are stored with the cell's row. `remark` is called with a
     sentence on what is not shown.
     """
     for trouble in results.store.troubles:
         remark(trouble)
     done = [row for row in results.rows if row["status"] == "done" and not row["is_baseline"]]
-    alike = grouped(done, itemgetter("task", "protocol", "split", "rig"))
     found = []
-    for (name, protocol, split, _), rows in alike.items():
+    for (name, protocol, split, _), rows in grouped(done, itemgetter("task", "protocol", "split", "rig")).items():
         where = f"{name} under {protocol}, split {split}"
         if name not in results.registry.tasks:
             remark(f"{where}: the task is not installed.")
             continue
         task = results.registry.tasks[name].spec
         beside = [row for row in rows if any(stands_beside(row, task, one) for one in task.published)]
+        answers = grouped(rows, answer_name)
         shown = answer_name(min(beside or rows, key=error_of))
-        others = ", ".join(one for one in dict.fromkeys(map(answer_name, rows)) if one != shown)
-        if others:
-            remark(f"{where}: {shown} is shown; not shown: {others}.")
+        if len(answers) > 1:
+            remark(f"{where}: {shown} is shown; not shown: {', '.join(one for one in answers if one != shown)}.")
         panels: dict[str, Panel] = {}
-        for row in rows:
-            if answer_name(row) != shown:
-                continue
-            answers = results.answers(row)
-            if "test" in answers:
-                panels.setdefault(row["sensor"], Panel(results.replicate(row), answers))
+        for row in answers[shown]:
+            stored = results.answers(row)
+            if "test" in stored:
+                panels.setdefault(row["sensor"], Panel(results.replicate(row), stored))
             else:
                 remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
         if panels:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tactbench.core.leaderboard.names import answer_name, lower_is_better, metric_name
+from tactbench.core.leaderboard.names import answer_name, direction, grouped, metric_name
 from tactbench.core.report.figures.group import MARKS, Sketch
 from tactbench.core.report.figures.style import BLACK, GREY, legend, panels, sensor_colours
 from tactbench.core.report.published import Reproduction, reproduce
@@ -21,35 +21,31 @@ _LINE_IN = 0.24
 
 def draw_published(results: Results) -> Sketch | None:
     """Draw each published score beside ours and those of our replicates; return None if no row is comparable."""
-    tasks: dict[str, list[tuple[Reproduction, Mapping[str, Any]]]] = {}
-    for line in reproduce(results.registry, results.rows):
-        if line.row["status"] == "done":
-            tasks.setdefault(line.task.name, []).append((line, line.row))
-    if not tasks:
+    lines = [line for line in reproduce(results.registry, results.rows) if line.row["status"] == "done"]
+    if not lines:
         return None
-    every = [pair for lines in tasks.values() for pair in lines]
-    rows = [row for _, row in every]
+    tasks = grouped(lines, lambda line: line.task.name)
     colours = sensor_colours(results.rows)
-    heights = [0.75 + _LINE_IN * len(lines) for lines in tasks.values()]
+    heights = [0.75 + _LINE_IN * len(own) for own in tasks.values()]
     figure, axes = panels(len(tasks), 1, sum(heights) / len(tasks), height_ratios=heights)
-    for here, lines in zip(axes[:, 0], tasks.values(), strict=True):
-        _panel(here, lines, colours)
-    simulated = all(row["simulated"] for row in rows)
+    for here, own in zip(axes[:, 0], tasks.values(), strict=True):
+        _panel(here, own, colours)
+    simulated = all(line.row["simulated"] for line in lines)
     figure.suptitle("Published scores and ours" + (" (SIM: ours are simulated)" if simulated else ""))
     legend(figure, axes[:, 0])
     parts = [
         "Open black diamonds are the published scores; filled circles are our scores, small strokes those of each "
-        "replicate, with intervals where five or more tell one."
+        "replicate, with intervals where there are five or more.",
+        *(text for key, text in MARKS.items() if any(line.row[key] for line in lines)),
+        f"Published: {'; '.join(dict.fromkeys(line.published.reference for line in lines))}.",
     ]
-    parts += [text for key, text in MARKS.items() if any(row[key] for row in rows)]
-    parts.append(f"Published: {'; '.join(dict.fromkeys(line.published.reference for line, _ in every))}.")
     return Sketch(NAME, "Are the published scores reproduced?", " ".join(parts), figure)
 
 
-def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mapping[str, str]) -> None:
-    """Draw one task: a row a published number and a sensor, the first on top."""
-    for place, (line, row) in enumerate(lines):
-        colour = colours[row["sensor"]]
+def _panel(here: Axes, lines: Sequence[Reproduction], colours: Mapping[str, str]) -> None:
+    """Draw one task: one row for each published number and sensor, the first on top."""
+    for place, line in enumerate(lines):
+        row, colour = line.row, colours[line.row["sensor"]]
         scores = row.get("replicate_scores") or []
         if len(scores) > 1:
             here.plot(
@@ -64,10 +60,9 @@ def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mappi
             line.published.score, place, "D", color=BLACK, markersize=5, markerfacecolor="white", zorder=5,
             label="published",
         )  # fmt: skip
-    here.set_yticks(range(len(lines)), [f"{row['sensor']}, {answer_name(row)}" for _, row in lines])
+    here.set_yticks(range(len(lines)), [f"{line.row['sensor']}, {answer_name(line.row)}" for line in lines])
     here.set_ylim(len(lines) - 0.4, -0.6)
     here.grid(axis="x", linewidth=0.4, color=GREY, alpha=0.3)
-    row = lines[0][1]
-    better = "lower" if lower_is_better(row["metric"]) else "higher"
-    here.set_xlabel(f"{metric_name(row)}, {better} is better")
+    row = lines[0].row
+    here.set_xlabel(f"{metric_name(row)}, {direction(row)}")
     here.set_title(f"{row['task']} · {row['protocol']}{' †' if row['dagger'] else ''}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cost.knobs import TIMES
 from tactbench.core.cost.precision import SHARE, diagrams, precise
-from tactbench.core.leaderboard.names import grouped, lower_is_better, metric_name
+from tactbench.core.leaderboard.names import direction, grouped, metric_name
 from tactbench.core.plugins.interfaces import CostPoint
 from tactbench.core.report.figures.style import BLACK, GREY, LINES, MARKERS, PAGE_IN, legend, panels
 from tactbench.core.tables.text import visible
@@ -45,8 +45,7 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
             here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
         _plain_numbers(here.xaxis)
-    better = "lower" if lower_is_better(known["metric"]) else "higher"
-    axes[0][0].set_ylabel(f"{metric_name(known)}, {better} is better")
+    axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
     return figure
