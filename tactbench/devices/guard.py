@@ -73,7 +73,7 @@ def largest_force_n(
 ) -> float:
     """Return F_c + k v t_r + k v^2/(2 a) [N], the largest force of a move that is stopped at a ceiling F_c (derived).
 
-    With the threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness up to there.
+    With the threshold of touch for F_c it is that of a first touch. k is the largest stiffness up to there.
     """
     return ceiling_n + stiffness_n_m * speed_m_s * (reaction + speed_m_s / (2 * acceleration_m_s2))
 
@@ -463,7 +463,7 @@ class LocalGuard:
                 continue
 
     def _continue_retreat(self) -> None:
-        """End the retreat if the pressing axis is out and the others stand, or has failed; else send it again if needed.
+        """End the retreat if the pressing axis is out and the others stand, or has failed; else send it anew if needed.
 
         The pressing axis is out where it stands at its place of retreat and the mean force since is near zero.
         """
