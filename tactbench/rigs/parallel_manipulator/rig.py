@@ -145,7 +145,7 @@ class PressAcquisition:
     @property
     def counts(self) -> Mapping[str, int]:
         """What drivers and guard have counted."""
-        guard = {f"{name}: {what}": n for name, counts in self.control.counts().items() for what, n in counts.items()}
+        guard = {f"{name}: {what}": n for name, counts in self.control.counts.items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property

@@ -56,8 +56,8 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert press.reports[-1].state is GuardState.ARMED
         assert made.world.largest_n == pytest.approx(made.setting.setpoint_n, abs=0.3)
         armed_ns = press.reports[0].t_ns
-        blocks = [block for block in made.guard.force_blocks() if block.t_ns[0] >= armed_ns]
-        moved = made.guard.motor_blocks()
+        blocks = [block for block in made.guard.force_blocks if block.t_ns[0] >= armed_ns]
+        moved = made.guard.motor_blocks
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
         # Raw and whole: every sample since it was armed, in order, as the sensor gave them.
@@ -67,8 +67,8 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
             made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
         )
-        assert [event.text for event in made.guard.events()] == ["started", "homing motor", "armed"]
-        assert made.guard.counts()["guard"]["beats"] == press.sequence
+        assert [event.text for event in made.guard.events] == ["started", "homing motor", "armed"]
+        assert made.guard.counts["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
         assert made.out
 
@@ -167,7 +167,7 @@ class TestInEitherProcess:
             ({"travel_m": (-4e-3, 2e-3)}, "place to retreat to is not within the travel"),
             ({"travel_m": (-7e-3, 2e-3)}, "not within the axis' ends"),
             ({"step_m": 1e-6}, "corridor is longer than a step"),
-            ({"zero": (0.0,) * 3}, "6 channels and 3 zeros"),
+            ({"zero": (0.0,) * 3}, "3 zeros"),
             ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "force while travelling"),
         ):
             with pytest.raises(GuardRefusesError, match=message):
@@ -182,7 +182,7 @@ class TestInEitherProcess:
         # 700 samples, which a full socket holds back.
         threading.Event().wait(0.7 * limits.heartbeat_s)
         assert guard.beat(Beat(in_process.clock())).accepted
-        assert len(np.concatenate([block.data for block in guard.force_blocks()])) > 100
+        assert len(np.concatenate([block.data for block in guard.force_blocks])) > 100
 
 
 # In virtual time ------------------------------------------------------------------------------------------------------
@@ -214,7 +214,8 @@ def test_a_force_that_is_not_a_number(tmp_path):
 def test_what_came_before_it_was_armed_is_not_handed_over_afterwards(made):
     made.guard.advance(made.clock() + 10**9)
     made.guard.arm(made.setting.limits)
-    assert made.guard.force_blocks() == made.guard.motor_blocks() == []
+    assert not made.guard.force_blocks
+    assert not made.guard.motor_blocks
 
 
 @pytest.mark.parametrize("baud", [9600, 115200])
@@ -299,7 +300,7 @@ def test_what_goes_wrong_in_devices_leads_to_a_fault(where, text, trigger, tmp_p
         report = made.ended(20.0)
         assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
         assert made.out is not (text.startswith(("motor-fault", "unplug")) and where.startswith("motor"))
-        events = made.guard.events()
+        events = made.guard.events
         (first,) = [event for event in events if event.trigger is trigger][:1]
         assert 1.5 <= 1e-9 * first.t_ns < 4.0
         assert math.isfinite(first.force_n)
@@ -351,7 +352,7 @@ def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
     made.press(held(made))
     report = made.ended(5.0)
     assert report.state is GuardState.FAULT
-    texts = [event.text for event in made.guard.events() if event.trigger is Trigger.RETREAT_FAILED]
+    texts = [event.text for event in made.guard.events if event.trigger is Trigger.RETREAT_FAILED]
     assert len(texts) == 1
     assert "stand clear" in texts[0]
     assert not made.world.motor.drive.enabled
@@ -404,7 +405,7 @@ def test_out_is_place_and_force(made):
     report = made.guard.disarm()
     assert made.out
     assert re.match(r"NOT KNOWN TO BE OUT: .* the force is 3\.\d\d N: stand clear", report.not_out)
-    (event,) = [event for event in made.guard.events() if event.trigger is Trigger.NOT_CLEAR]
+    (event,) = [event for event in made.guard.events if event.trigger is Trigger.NOT_CLEAR]
     assert event.text == report.not_out
     made.world.sensed = lambda wrench, at_s: wrench
     with pytest.raises(GuardRefusesError, match="NOT KNOWN TO BE OUT"):
@@ -441,7 +442,7 @@ def test_a_place_that_jumps_ends_the_press_and_is_no_place_to_retreat_from(made)
     made.press(in_phase("ramp", jump))
     report = made.ended()
     assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.AXIS_FAULT)
-    assert any("faster than it moves" in event.text for event in made.guard.events())
+    assert any("faster than it moves" in event.text for event in made.guard.events)
     assert "stand clear" in report.not_out
     # The drive itself runs to its target by the new count, at 20 mm/s, until the ceiling halts it.
     bound_n = largest_force_n(6.0, 20e3, 20e-3, 1.0, 4e-3 + made.guard._press.facts.stop_latency_s)
