@@ -21,11 +21,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, MutableSequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import NoReturn
 
 from tactbench.core.errors import (
     LinkClosed,
@@ -52,8 +52,6 @@ from tactbench.devices.guard_messages import (
 from tactbench.devices.positioner import Positioner, PositionerSilentError
 from tactbench.links.link import Clock
 
-T = TypeVar("T")
-
 FORCE = "force"
 """Name of the force sensor beside the axes."""
 LOOK_S = 1e-3
@@ -73,7 +71,7 @@ def largest_force_n(
 ) -> float:
     """Return F_c + k v t_r + k v^2/(2 a) [N], the largest force of a move that is stopped at a ceiling F_c (derived).
 
-    With the threshold of touch for F_c it is that of a first touch. k is the largest stiffness up to there.
+    With the threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness until then.
     """
     return ceiling_n + stiffness_n_m * speed_m_s * (reaction + speed_m_s / (2 * acceleration_m_s2))
 
@@ -99,6 +97,12 @@ class LocalGuard:
     kept
         A file that exists from arming until the pressing axis is known to be clear of the sensor, and contains the
         reason; the next guard with this file begins with it. None: no file.
+
+    Attributes
+    ----------
+    force_blocks, motor_blocks, events
+        Samples of the force sensor, states of the pressing axis, and events, until the rig clears them. Force samples
+        that are doubled or late are left out.
     """
 
     def __init__(
@@ -122,8 +126,8 @@ class LocalGuard:
         self._on_event, self._interrupted = on_event, interrupted
         self._watch = ForceWatch(self.force_stream)
         self._limits: Limits | None = None
-        self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
-        self._events: list[Event] = []
+        self.force_blocks, self.motor_blocks = self._watch.blocks, deque[Block](maxlen=MOST_BLOCKS)
+        self.events: list[Event] = []
         self._kept = kept
         self._not_out = kept.read_text(encoding="utf-8") if kept is not None and kept.exists() else ""
         self._counts: Counter[str] = Counter()
@@ -199,8 +203,8 @@ class LocalGuard:
         self._refused, self._touched = 0, False
         self._end_sequence = self._watch.sequence
         # The samples of a homing may be those of a minute: to send them would take the time of a beat.
-        self._watch.blocks.clear()
-        self._motor_blocks.clear()
+        self.force_blocks.clear()
+        self.motor_blocks.clear()
         self._beat_ns = self._clock()
         self._record(None, "armed")
         return self._report()
@@ -230,26 +234,15 @@ class LocalGuard:
         return self._report(reason, early=early)
 
     def advance(self, until_ns: int) -> None:
-        """Look until the clock says so much."""
+        """Look until the clock is at a nanosecond."""
         while (left_ns := until_ns - self._clock()) > 0:
             self.look(min(LOOK_S, 1e-9 * left_ns))
 
-    def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call, but for those that came twice or after newer ones."""
-        return taken(self._watch.blocks)
-
-    def motor_blocks(self) -> list[Block]:
-        """Return all states of the pressing axis since the last call."""
-        return taken(self._motor_blocks)
-
-    def events(self) -> list[Event]:
-        """Return all events since the last call."""
-        return taken(self._events)
-
+    @property
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``.
+        """Counts of the drivers, and the guard's ``beats``, ``early``, ``refused``.
 
-        To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
+        The force sensor's also have ``duplicates`` and ``late`` samples, which are dropped, and missing ones, ``gaps``.
         """
         force, order = Counter(self._force.counts), self._watch.order
         force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
@@ -353,12 +346,12 @@ class LocalGuard:
             silent = isinstance(error, PositionerSilentError | LinkTimeout)
             return Trigger.AXIS_SILENT if silent else Trigger.AXIS_FAULT, text
         if axis is self._press:
-            self._motor_blocks += blocks
+            self.motor_blocks += blocks
             if was_moving and not axis.moving:
                 self._end_sequence = self._watch.sequence
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
-            return Trigger.AXIS_FAULT, f"{name}: the controller says {axis.state.problem}"
+            return Trigger.AXIS_FAULT, f"{name}: the controller reports {axis.state.problem}"
         return None
 
     # Commands ---------------------------------------------------------------------------------------------------------
@@ -400,13 +393,11 @@ class LocalGuard:
     def _travel_reason(self, beat: Beat) -> str:
         if not self._retracted or self._press.moving:
             return f"{self._name} is not retracted"
-        limits = {name: axis.facts.limits for name, axis in self._others.items()}
-        beyond = [
-            name
-            for name, at in beat.targets.items()
-            if name not in limits or not limits[name][0] <= at <= limits[name][1]
-        ]
-        return f"the target of {beyond[0]} is outside its travel" if beyond else ""
+        for name, target in beat.targets.items():
+            low, high = self._others[name].facts.limits if name in self._others else (math.nan, math.nan)
+            if not low <= target <= high:
+                return f"the target of {name} is outside its travel"
+        return ""
 
     def _press_reason(self, beat: Beat, limits: Limits) -> str:
         """Return the reason why the pressing axis may not move; empty: it may."""
@@ -463,7 +454,7 @@ class LocalGuard:
                 continue
 
     def _continue_retreat(self) -> None:
-        """End the retreat if the pressing axis is out and the others stand, or has failed; else send it anew if needed.
+        """End the retreat if the pressing axis is out and the others stand, or it has failed; send it again if needed.
 
         The pressing axis is out where it stands at its place of retreat and the mean force since is near zero.
         """
@@ -633,7 +624,7 @@ class LocalGuard:
 
     def _record(self, trigger: Trigger | None, text: str) -> None:
         event = Event(self._clock(), self.state, trigger, self._watch.force_n, self._press.position, text)
-        self._events.append(event)
+        self.events.append(event)
         self._on_event(event)
 
     def _report(self, reason: str = "", *, early: bool = False) -> Report:
@@ -660,10 +651,3 @@ def retreat_seconds(press: Positioner) -> float:
     """Return the longest time of a retreat [s], from the far end of the travel."""
     low, high = press.facts.limits
     return (high - low) / press.facts.retreat_speed + RETREAT_S
-
-
-def taken(kept: MutableSequence[T]) -> list[T]:
-    """Empty a list, and return its items."""
-    found = list(kept)
-    kept.clear()
-    return found

@@ -39,7 +39,7 @@ from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchErro
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import DriverSettings
-from tactbench.devices.guard import LOOK_S, LocalGuard, retreat_seconds, taken
+from tactbench.devices.guard import LOOK_S, LocalGuard, retreat_seconds
 from tactbench.devices.guard_messages import (
     Beat,
     Event,
@@ -131,7 +131,7 @@ class ProcessSettings:
 
 
 class GuardProcess:
-    """A guard in a process of its own, with the methods of :class:`~.guard.LocalGuard`.
+    """A guard in a process of its own, with the methods and attributes of :class:`~.guard.LocalGuard`.
 
     Once the process is lost, each request raises GuardLostError. Samples, events and counts are those of the answers so
     far.
@@ -160,10 +160,10 @@ class GuardProcess:
         self._requested = ""
         self._closed = False
         self._lost: GuardLostError | None = None
-        self._force_blocks: list[Block] = []
-        self._motor_blocks: list[Block] = []
-        self._events: list[Event] = []
-        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self.force_blocks: list[Block] = []
+        self.motor_blocks: list[Block] = []
+        self.events: list[Event] = []
+        self.counts: Mapping[str, Mapping[str, int]] = {}
         ours, theirs = socket.socketpair()
         for end in (ours, theirs):
             for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
@@ -204,22 +204,6 @@ class GuardProcess:
             self._fail("its connection has ended")
         self._request("collect", self._timeout_s)
 
-    def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call."""
-        return taken(self._force_blocks)
-
-    def motor_blocks(self) -> list[Block]:
-        """Return all states of the pressing axis since the last call."""
-        return taken(self._motor_blocks)
-
-    def events(self) -> list[Event]:
-        """Return all events since the last call."""
-        return taken(self._events)
-
-    def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the counts; see :meth:`.LocalGuard.counts`."""
-        return self._counts
-
     def disarm(self) -> Report:
         """Retreat if the pressing axis is not out, and expect no more beats."""
         report: Report = self._request("disarm", ARM_S)
@@ -254,12 +238,12 @@ class GuardProcess:
             self._connection.send((what, given))
             if not self._connection.poll(timeout_s):
                 self._fail(f"it has not answered within {timeout_s:.3f} s")
-            result, force_blocks, motor_blocks, events, self._counts = self._connection.recv()
+            result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
         except (EOFError, OSError):
             self._fail("its connection has ended")
-        self._force_blocks += force_blocks
-        self._motor_blocks += motor_blocks
-        self._events += events
+        self.force_blocks += force_blocks
+        self.motor_blocks += motor_blocks
+        self.events += events
         if isinstance(result, TactbenchError):
             raise result
         return result
@@ -278,7 +262,7 @@ class GuardProcess:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
         text = f"The guard's process is lost: {why}; {outcome}."
-        self._events.append(Event(self._clock(), GuardState.FAULT, trigger, math.nan, math.nan, text))
+        self.events.append(Event(self._clock(), GuardState.FAULT, trigger, math.nan, math.nan, text))
         self._lost = GuardLostError(text, hint=f"Its last events are in {self._settings.log}.")
         raise self._lost
 
@@ -344,10 +328,14 @@ class _Server:
                 result = getattr(self._guard, what)(*(() if given is None else (given,)))
         except TactbenchError as error:
             result = error
-        if self._guard is None:
-            return result, [], [], [], {}
         guard = self._guard
-        return result, guard.force_blocks(), guard.motor_blocks(), guard.events(), guard.counts()
+        if guard is None:
+            return result, [], [], [], {}
+        waiting = guard.force_blocks, guard.motor_blocks, guard.events
+        answer = result, list(guard.force_blocks), list(guard.motor_blocks), list(guard.events), guard.counts
+        for items in waiting:
+            items.clear()
+        return answer
 
     def _start(self, settings: ProcessSettings) -> Any:
         self._clock = clock = settings.clock()

@@ -13,10 +13,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
-ARPHRD_CAN = 280
-"""Type of a CAN interface in /sys/class/net (linux/if_arp.h)."""
-IFF_UP = 1
-"""Flag of an interface that is up (linux/if.h)."""
 REQUESTED_BUFFER_BYTES = 4 << 20
 """Receive buffer that a datagram link requests of the system unless its address states another."""
 FOR_DEVELOPERS = ("docs", "test", "dev")
@@ -83,21 +79,21 @@ def _device(kind: str, path: str, text: str = "") -> HostItem:
 
 def can_interfaces() -> Iterator[HostItem]:
     """Yield whether the kernel has CAN sockets, and their interfaces, up or not."""
+    import psutil
+
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
         yield HostItem("CAN", "socketcan", "works")
     except (OSError, AttributeError):
         yield HostItem("CAN", "socketcan", "missing", "the kernel has no AF_CAN", "can://slcan/PORT needs none.")
-    for folder in sorted(Path("/sys/class/net").glob("*")):
-        try:
-            if int((folder / "type").read_text()) != ARPHRD_CAN:
-                continue
-            up = bool(int((folder / "flags").read_text(), 16) & IFF_UP)
-        except (OSError, ValueError):
+    for name, stats in sorted(psutil.net_if_stats().items()):
+        if "can" not in name:
             continue
-        rate = "" if folder.name.startswith("vcan") else " type can bitrate 1000000"
-        hint = "" if up else f"sudo ip link set {folder.name} up{rate}"
-        yield HostItem("CAN", folder.name, "works" if up else "missing", "up" if up else "down", hint)
+        if stats.isup:
+            yield HostItem("CAN", name, "works", "up")
+        else:
+            rate = "" if name.startswith("vcan") else " type can bitrate 1000000"
+            yield HostItem("CAN", name, "missing", "down", f"sudo ip link set {name} up{rate}")
 
 
 def network() -> Iterator[HostItem]:

@@ -89,6 +89,8 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         same_samples=10**9 if entry.emulated else Limits.same_samples,  # an emulated sensor at rest has no noise
     )  # fmt: skip
 
+    back = 0
+
     def look() -> str:
         """Read axis and force once; return the problem with the force."""
         axis.update(0.0)
@@ -128,7 +130,6 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         if halted:
             say(f"The {name} was halted: {halted}")
 
-    back = 0
     try:
         if not (axis.homed or axis.find_home()):
             clear = "Is it clear of the sensor, and the emergency stop within reach? Write yes: it is homed. "

@@ -146,7 +146,7 @@ class PressAcquisition:
     @property
     def counts(self) -> Mapping[str, int]:
         """The counts of drivers and guard."""
-        guard = {f"{name}: {what}": n for name, counts in self.control.counts().items() for what, n in counts.items()}
+        guard = {f"{name}: {what}": n for name, counts in self.control.counts.items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property

@@ -13,8 +13,7 @@ from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter
-from tactbench.plugin import ChannelSpec, StreamSpec
-from tactbench.plugin.devices import EmulatorSettings, RowEmulator, open_link
+from tactbench.plugin.devices import open_link
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 from tests.devices.emulation.test_virtual_time import on, say
 
@@ -38,23 +37,6 @@ def test_what_is_due_is_sent_and_nothing_before():
             assert data + (b"" if len(data) == 6 else link.read(1.0).data) == bytes([1, 0, 0, 2, 0, 0])
     finally:
         server.close()
-
-
-@pytest.mark.parametrize(("rate_hz", "baud"), [(100.0, 115200), (1000.0, 921_600)])
-def test_the_address_states_a_baud_rate_that_carries_what_is_sent(rate_hz, baud):
-    """64 bytes a row at 1 kHz were written down with 115200 baud, 11.5 kB/s."""
-    row = StreamSpec(name="row", channels=tuple(ChannelSpec(name=f"c{n}", kind="taxel") for n in range(64)))
-
-    class Sends(RowEmulator):
-        stream = row
-
-        def sent(self, values):
-            return [bytes(len(values))]
-
-    model = Sends(EmulatorSettings(lambda t_s: {}, None))
-    model.rate_hz = rate_hz
-    with EmulatedDevices({"a": on("bytes", model)}, time="real") as devices:
-        assert devices.addresses["a"].endswith(f"?baud={baud}")
 
 
 @needs_pty
