@@ -21,7 +21,6 @@ from tactbench.rigs.parallel_manipulator.settings import (
     RigSettings,
     axes_of,
     positioner_of,
-    settings_of,
     with_limits,
 )
 
@@ -37,16 +36,6 @@ _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_
 _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_unit_a")
 
 
-def refuse(file: RigFile) -> None:
-    """Raise UsageError if a rig file is refused for its contents; raises as :func:`check` as well."""
-    problems = check(file).problems
-    if problems:
-        raise UsageError(
-            f"The rig file is refused: {problems[0]}",
-            hint="`tactbench doctor --rig-file FILE --seconds 0` says all that it would do.",
-        )
-
-
 def check(file: RigFile) -> RigCheck:
     """Return the forces of axes and loop, and the problems for which the file is refused.
 
@@ -55,8 +44,8 @@ def check(file: RigFile) -> RigCheck:
     UsageError, UnknownNameError
         If the file lacks something, or names what is not installed.
     """
-    settings, registry = settings_of(file), load_registry()
-    file = with_limits(file, settings, registry)
+    registry = load_registry()
+    file, settings = with_limits(file, registry)
     problems: list[str] = []
     facts: dict[str, PositionerFacts] = {}
     most_n: dict[str, float] = {}
