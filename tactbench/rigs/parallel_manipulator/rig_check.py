@@ -199,7 +199,6 @@ def _forces(
     k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
     by_step = limits.force_ceiling_n + k * (settings.force_loop.step_m + motor.corridor)
     by_approach = largest_force_n(limits.force_ceiling_n, k, slow, acceleration, react_s)
-    unguarded_s = 2e-3 * limits.heartbeat_ms + motor.stop_latency_s
     # A control period, and the mean of a rising force is half its time behind; or three single samples.
     behind_s = 1 / settings.force_loop.rate_hz + 0.5e-3 * touch.mean_ms
     first = min(
@@ -229,7 +228,6 @@ def _forces(
             f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
         ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
-        ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),
         *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),
     ]
     problems = []
