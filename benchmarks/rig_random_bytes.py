@@ -17,8 +17,6 @@ from tactbench.plugin.devices import EmulatorSettings
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
-    Record,
-    Request,
     decode_records,
     encode_record,
     encode_request,
@@ -69,7 +67,7 @@ def main(count: int, seed: int) -> None:
                 whole += len(decode_records(piece[start:end]))
             except DatagramError:
                 rejected += 1
-        assert decode_records(encode_record(Record(5, 0, 0, (0,) * 6)))["rdt_sequence"] == 5
+        assert decode_records(encode_record(5, 0, 0, (0,) * 6))["rdt_sequence"] == 5
     print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected")
 
     for name, load in (("free", 0.0), ("pressing", 5000.0)):
@@ -81,7 +79,7 @@ def main(count: int, seed: int) -> None:
         print(f"motor, {name}: {time.perf_counter() - begin:.3f} s for 1 s at a tick of 1 ms, polled at 1 kHz")
     for rate_hz in (1000.0, 7000.0):
         box = RdtEmulator(EmulatorSettings(lambda _t: {}, rng, COUNTS | {"rate_hz": rate_hz}))
-        box.feed(encode_request(Request(Command.START_REALTIME)), 0.0)
+        box.feed(encode_request(Command.START_REALTIME), 0.0)
         begin = time.perf_counter()
         sent = box.poll(1.0)
         decode_records(b"".join(datagram for _, datagram in sent))

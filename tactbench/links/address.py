@@ -42,7 +42,6 @@ KINDS = MappingProxyType(
     {
         "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _Line),
         "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _Line),
-        "rfc2217": _Kind("rfc2217://192.168.1.5:2217?baud=115200", _Line),
         "socket": _Kind("socket://192.168.1.5:4001", _None),
         "loop": _Kind("loop://", _None),
         "can": _Kind("can://socketcan/can0", _None),

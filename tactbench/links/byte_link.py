@@ -41,7 +41,7 @@ class SerialLink(ByteLink):
     ----------
     port
         A device (``/dev/ttyUSB0``, ``COM3``) or a URL of pyserial (``socket://host:port``, ``spy:///dev/ttyUSB0``,
-        ``loop://``, ``rfc2217://host:port``). A device is opened exclusively.
+        ``loop://``). A device is opened exclusively.
     baud
         Bits per second, start and stop bits included.
     parity, stop_bits
@@ -80,7 +80,7 @@ class SerialLink(ByteLink):
         except _NOT_OPENED as error:
             raise cannot_open(port, error) from error
         # Waiting for the file descriptor gives the earliest stamp, and does not touch the port's settings: pyserial
-        # sets all of them anew for each change of its timeout. Windows' ports, loop and rfc2217 have no descriptor.
+        # sets all of them anew for each change of its timeout. Windows' ports and loop have no descriptor.
         self._ready: selectors.BaseSelector | None = None
         try:
             descriptor = self._port.fileno()

@@ -19,18 +19,14 @@ from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, ca
 
 WAITED_S = 60.0
 """Longest wait of a frame in a kernel's queue (assumed): an older stamp is not used."""
-SYSTEMS_OWN_NS = 5_000_000
-"""Largest lag of stamps by the system's own clock, and largest scatter of stamps that are used (assumed: a wake-up
-takes less)."""
-LEAST_OF = 200
-"""Frames of which one at least was read on receipt, where the reader waited for none (assumed)."""
-WINDOW_NS = 5_000_000_000
-"""The least age is that of this window and the one before (assumed: at 100 ppm, 1 ms meanwhile)."""
-_HEX = r"[\dA-Fa-f]"
-_SLCAN = re.compile("|".join([
-    *(rf"(?:t{_HEX}{{3}}|[Tx]{_HEX}{{8}}){n}{_HEX}{{{2 * n}}}(?:{_HEX}{{4}}(?=[tTrRx]|$))?" for n in range(9)),
-    rf"(?:r{_HEX}{{3}}|R{_HEX}{{8}})[0-8]",
-]))  # fmt: skip
+AT_ONCE_NS = 5_000_000
+"""Longest time from the receipt of a frame by the kernel to that by a waiting reader, in the median (assumed)."""
+_SLCAN = re.compile(
+    "|".join(
+        [*(rf"(t[\dA-Fa-f]{{3}}|[Tx][\dA-Fa-f]{{8}}){n}([\dA-Fa-f]{{2}}){{{n}}}([\dA-Fa-f]{{4}})?" for n in range(9))]
+    )
+    + r"|(r[\dA-Fa-f]{3}|R[\dA-Fa-f]{8})[0-8]"
+)
 """A data frame of n bytes, with or without the adapter's milliseconds behind it, or a remote frame."""
 
 
@@ -97,59 +93,42 @@ def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | Non
 
 
 class _Stamps:
-    """Converts python-can's stamps, seconds since 1970 or since an adapter's start, to a link's clock.
+    """Converts python-can's stamps, seconds since 1970, to a link's clock, where they are of the system's own clock.
 
     A stamp's age is the system's time at receipt less the stamp. A frame that the reader waited for has just been
-    received, as has one of some hundred others: the least recent age is the lag of the stamps' clock. Where the
-    system's clock is set meanwhile, queued frames have stamps of the earlier one: the least age of both is used.
+    received: if the stamps of such frames are old or from the future, they are of another clock, or too coarse.
     """
 
     def __init__(self, clock: Clock, wall: Clock = time.time_ns) -> None:
         self._clock, self._wall = clock, wall
-        self._walls: deque[int] = deque(maxlen=4)
-        self._least: deque[tuple[int, int]] = deque(maxlen=2)
-        self._seen, self._known = 0, False
-        self._late: deque[int] = deque(maxlen=31)
-        """Ages of frames that the reader waited for, less the least age."""
+        self._offset_ns = wall() - clock()
+        self._ages_ns: deque[int] = deque(maxlen=31)
+        """Of frames that the reader waited for."""
 
     @property
-    def refused(self) -> bool:
-        """Whether stamps scatter too much to be times: half of the frames just received had old ones."""
-        return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
-
-    def lag_ns(self) -> int:
-        """Return the lag of the stamps' clock behind the system's; 0: it is that one, or not known yet."""
-        least_ns = min((least_ns for _, least_ns in self._least), default=0)
-        return least_ns if self._known and abs(least_ns) > SYSTEMS_OWN_NS else 0
+    def usable(self) -> bool:
+        """Whether frames that were just received have new stamps, as far as is known."""
+        return not self._ages_ns or abs(statistics.median(self._ages_ns)) < AT_ONCE_NS
 
     def __call__(self, stamp_s: float, *, waited: bool) -> int:
         """Return the time of receipt of a frame; `waited`: whether the reader waited for it."""
-        now_ns, lag_ns = self._clock(), self.lag_ns()
-        wall_ns = self._wall() - now_ns
-        if self._walls and abs(wall_ns - self._walls[-1]) < SYSTEMS_OWN_NS:
-            self._walls[-1] = wall_ns
-        else:
-            self._walls.append(wall_ns)
-        ages_ns = [now_ns + one - round(1e9 * stamp_s) for one in self._walls]
-        possible = [age_ns for age_ns in ages_ns if age_ns >= lag_ns - SYSTEMS_OWN_NS]
-        age_ns = min(possible) if possible else ages_ns[-1]
-        self._seen += 1
-        self._known |= waited or self._seen >= LEAST_OF
-        if not self._least or now_ns - self._least[-1][0] > WINDOW_NS:
-            self._least.append((now_ns, age_ns))
-        elif age_ns < self._least[-1][1]:
-            self._least[-1] = (self._least[-1][0], age_ns)
-        waited_ns = age_ns - self.lag_ns()
+        now_ns = self._clock()
+        offset_ns = self._wall() - now_ns
+        if abs(offset_ns - self._offset_ns) > AT_ONCE_NS:  # the clock was set: queued frames have stamps of before
+            self._ages_ns.clear()
+            self._ages_ns.append(AT_ONCE_NS)
+        self._offset_ns = offset_ns
+        age_ns = now_ns + offset_ns - round(1e9 * stamp_s)
         if waited:
-            self._late.append(waited_ns)
-        return now_ns - waited_ns if 0 <= waited_ns < 1e9 * WAITED_S and not self.refused else now_ns
+            self._ages_ns.append(age_ns)
+        return now_ns - age_ns if self.usable and 0 <= age_ns < 1e9 * WAITED_S else now_ns
 
 
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
-    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), converted to the link's clock.
-    Where stamps lag behind the system's clock, the least age is subtracted, and such frames are counted.
+    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), converted to the link's clock. If
+    stamps are of another clock than the system's, it is the time of receipt, and such frames are counted.
 
     Parameters
     ----------
@@ -198,7 +177,7 @@ class CanBus(CanLink):
                 came = message is not None
                 if came:
                     t_ns = self._stamp(message.timestamp, waited=waited)
-                    if self._stamp.lag_ns() or self._stamp.refused:
+                    if not self._stamp.usable:
                         self.counts["frames stamped by another clock"] += 1
                     frame = _data_frame(message, t_ns, self.counts)
                     if frame is not None:
@@ -214,10 +193,9 @@ class CanBus(CanLink):
         raise self._nothing_came(timeout_s)
 
     def _slcan_frame(self, timeout_s: float | None) -> str | None:
-        """Return the next frame of python-can's slcan, which takes all between two CR or BEL for one.
+        """Return the next line of python-can's slcan without line feed; one that is no frame is empty, and counted.
 
-        Line feeds are left out; frames whose CR was lost are returned one by one; unreadable text is counted, and BEL,
-        by which an adapter reports an error.
+        BEL, by which an adapter reports an error, is counted too.
         """
         line: str | None = self._read_line(timeout_s)
         if not line:
@@ -225,14 +203,10 @@ class CanBus(CanLink):
         if line.endswith("\a"):
             self.counts["errors of the adapter"] += 1
         text = line.strip("\r\n\a")
-        if not text or text[0] in "dDbBzZVNF":  # FD frames, and answers to commands
-            return f"{text}\r"
-        frames = [found[0] for found in _SLCAN.finditer(text)]
-        if _SLCAN.sub("", text):
+        if text and text[0] not in "dDbBzZVNF" and not _SLCAN.fullmatch(text):  # FD frames, and answers to commands
             self.counts["unreadable frames"] += 1
-        for frame in frames[1:]:
-            self._bus._queue.put_nowait(f"{frame}\r")
-        return f"{frames[0]}\r" if frames else "\r"
+            return "\r"
+        return f"{text}\r"
 
     def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
         import can

@@ -18,7 +18,7 @@ import numpy as np
 from tactbench.plugin import Acquisition, NotApplicable, Scene, SensorDescriptor
 from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, settings_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatedDevice
@@ -127,13 +127,13 @@ class PressEmulators(RigEmulators):
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
-        self._file, self._settings = file, settings_of(file)
+        self._file = file
+        limited, self._settings = with_limits(file, registry)
         self.press: EmulatedPress | None = None
         """The present scene; None: nothing is pressed."""
         self.pushed_n = 0.0
         """Force of a push by hand on the force sensor, beside that of the skin."""
         self._motor: Any = None
-        limited = with_limits(file, self._settings, registry)
         devices: dict[str, EmulatedDevice] = {}
         for sensor in file.sensors:
             own = emulators_of(with_sensor(limited, sensor), registry, sensor, self._sensed)

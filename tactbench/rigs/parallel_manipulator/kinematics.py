@@ -72,10 +72,6 @@ PerLeg = Annotated[tuple[float, float, float], BeforeValidator(_for_each_leg)]
 PositivePerLeg = Annotated[tuple[Length, Length, Length], BeforeValidator(_for_each_leg)]
 
 
-class UnreachableError(RigError):
-    """A place that a leg does not reach."""
-
-
 class ClosureError(RigError):
     """Joint values at which the three links do not meet, or that fix no place."""
 
@@ -157,13 +153,10 @@ class LinearDelta(Options):
         return self.anchor_m + q[..., None] * self.rail
 
 
-def _finite(values: FloatArray, what: str) -> FloatArray:
-    found = np.asarray(values, dtype=np.float64)
-    if found.shape[-1:] != (3,):
-        raise UsageError(f"{what} has shape {found.shape}; expected (..., 3).")
-    if not np.isfinite(found).all():
-        raise UsageError(f"{what} is not a finite number.", hint="Lengths are metres here.")
-    return found
+def _finite(values: FloatArray) -> FloatArray:
+    if not np.isfinite(values).all():
+        raise UsageError("A place or a joint value of the manipulator is not a finite number.")
+    return values
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -179,34 +172,11 @@ def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, Floa
 
     Where a leg does not reach, its joint value is that of the stretched leg; never a NaN.
     """
-    w = _finite(p_m, "A place")[..., None, :] - delta.anchor_m
+    w = _finite(p_m)[..., None, :] - delta.anchor_m
     along = _dot(w, delta.rail)
     beside = np.linalg.norm(w - along[..., None] * delta.rail, axis=-1)
     L = delta.link_m
     return along + _root((L - beside) * (L + beside)), beside - L
-
-
-def inverse(delta: LinearDelta, p_m: FloatArray) -> FloatArray:
-    """Return the (..., 3) joint values [m] of places (..., 3) [m].
-
-    Raises
-    ------
-    UnreachableError
-        With leg and shortfall, if any leg misses any place by more than `ROUNDING` of its link.
-    UsageError
-        If a place is not finite.
-    """
-    q, shortfall = solve_inverse(delta, p_m)
-    missing = shortfall - ROUNDING * delta.link_m
-    if (missing > 0).any():
-        where = np.unravel_index(int(np.argmax(missing)), missing.shape)
-        place = ", ".join(f"{1e3 * x:.3f}" for x in np.asarray(p_m)[where[:-1]])
-        raise UnreachableError(
-            f"Leg {int(where[-1]) + 1} of {delta.title} misses the place ({place}) mm by "
-            f"{1e3 * float(shortfall[where]):.3g} mm.",
-            hint="Choose a place inside its workspace.",
-        )
-    return q
 
 
 def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
@@ -220,7 +190,7 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     UsageError
         If a joint value is not finite.
     """
-    centre = delta.centre_m(_finite(q, "A joint value"))
+    centre = delta.centre_m(_finite(q))
     L, c1 = delta.link_m, centre[..., 0, :]
     a, b = centre[..., 1, :] - c1, centre[..., 2, :] - c1
     n = np.cross(a, b)
@@ -334,8 +304,8 @@ def way(
 
 
 def way_points(delta: LinearDelta, places: list[Place]) -> Iterator[list[float]]:
-    """Yield the joint values [m] of the way points of a way."""
+    """Yield the joint values [m] of the way points of a permitted way."""
     for start, end in pairwise(np.array(place) for place in places):
         pieces = math.ceil(float(np.linalg.norm(end - start)) / WAY_POINT_M)
         for n in range(1, pieces + 1):
-            yield inverse(delta, start + n / pieces * (end - start)).tolist()
+            yield solve_inverse(delta, start + n / pieces * (end - start))[0].tolist()

@@ -46,9 +46,9 @@ from tactbench.plugin.devices import (
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
-from tactbench.rigs.parallel_manipulator.rig_check import refuse
+from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.session import Session
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, settings_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -181,11 +181,10 @@ class ParallelManipulator(Rig):
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
-        self.settings, self._registry = settings_of(file), load_registry()
-        self._file, self._operator, self._physics = file, operator, physics
+        self._file, self._operator, self._physics, self._registry = file, operator, physics, load_registry()
         self._session: Session | None = None
-        motor = with_limits(file, self.settings, self._registry).devices[MOTOR]
-        kind, options = positioner_of(self._registry, MOTOR, motor)
+        limited, self.settings = with_limits(file, self._registry)
+        kind, options = positioner_of(self._registry, MOTOR, limited.devices[MOTOR])
         self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
 
     def close(self) -> None:
@@ -376,5 +375,10 @@ def build(context: RigContext) -> ParallelManipulator:
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
             hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
         )
-    refuse(context.rig_file)
-    return ParallelManipulator(context.rig_file, context.operator, physics_of(context.rig_file, load_registry()))
+    file = context.rig_file
+    if problems := check(file).problems:
+        raise UsageError(
+            f"The rig file is refused: {problems[0]}",
+            hint="`tactbench doctor --rig-file FILE --seconds 0` says all that it would do.",
+        )
+    return ParallelManipulator(file, context.operator, physics_of(file, load_registry()))

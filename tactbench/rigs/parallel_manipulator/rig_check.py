@@ -21,7 +21,6 @@ from tactbench.rigs.parallel_manipulator.settings import (
     RigSettings,
     axes_of,
     positioner_of,
-    settings_of,
     with_limits,
 )
 
@@ -37,16 +36,6 @@ _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_
 _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_unit_a")
 
 
-def refuse(file: RigFile) -> None:
-    """Raise UsageError if a rig file is refused for its contents; raises as :func:`check` as well."""
-    problems = check(file).problems
-    if problems:
-        raise UsageError(
-            f"The rig file is refused: {problems[0]}",
-            hint="`tactbench doctor --rig-file FILE --seconds 0` says all that it would do.",
-        )
-
-
 def check(file: RigFile) -> RigCheck:
     """Return the forces of axes and loop, and the problems for which the file is refused.
 
@@ -55,8 +44,8 @@ def check(file: RigFile) -> RigCheck:
     UsageError, UnknownNameError
         If the file lacks something, or names what is not installed.
     """
-    settings, registry = settings_of(file), load_registry()
-    file = with_limits(file, settings, registry)
+    registry = load_registry()
+    file, settings = with_limits(file, registry)
     problems: list[str] = []
     facts: dict[str, PositionerFacts] = {}
     most_n: dict[str, float] = {}
@@ -210,7 +199,6 @@ def _forces(
     k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
     by_step = limits.force_ceiling_n + k * (settings.force_loop.step_m + motor.corridor)
     by_approach = largest_force_n(limits.force_ceiling_n, k, slow, acceleration, react_s)
-    unguarded_s = 2e-3 * limits.heartbeat_ms + motor.stop_latency_s
     # A control period, and the mean of a rising force is half its time behind; or three single samples.
     behind_s = 1 / settings.force_loop.rate_hz + 0.5e-3 * touch.mean_ms
     first = min(
@@ -240,7 +228,6 @@ def _forces(
             f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
         ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
-        ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),
         *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),
     ]
     problems = []

@@ -30,7 +30,7 @@ from tactbench.plugin.devices import (
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import PressEmulators
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, Place, forward, way, way_points
-from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, settings_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin import Block, FloatArray
@@ -70,14 +70,14 @@ class Session:
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
-        self.settings = settings_of(file)
+        limited, self.settings = with_limits(file, registry)
+        self._file = limited.checked_for_one_clock()
         self._registry, self._stack = registry, ExitStack()
         self.emulators: PressEmulators | None = None
         self.emulated: EmulatedDevices | None = None
         self.checked = ""
         self.clock: Clock = time.monotonic_ns
         self._links: Mapping[str, Callable[[], Link]] = {}
-        self._file = with_limits(file, self.settings, registry).checked_for_one_clock()
         with ExitStack() as opening:
             opening.callback(self._stack.close)
             if file.emulated:

@@ -356,8 +356,15 @@ def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Po
     return kind, {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
 
 
-def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
-    """Return the file with the settings' limits among the motor's options; raises UsageError if those state any."""
+def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
+    """Return the file with the settings' limits among the motor's options, and its settings.
+
+    Raises
+    ------
+    UsageError
+        As :func:`settings_of`, and if the motor's options state a limit of their own.
+    """
+    settings, entry = settings_of(file), file.devices[MOTOR]
     limits = settings.limits
     own = {
         "lower_m": 1e-3 * limits.travel_mm[0],
@@ -367,7 +374,6 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
         "speed_m_s": 1e-3 * settings.touch.speed_mm_s,
         "acceleration_m_s2": 1e-3 * settings.touch.acceleration_mm_s2,
     }
-    entry = file.devices[MOTOR]
     kind, options = positioner_of(registry, MOTOR, entry)
     if "homing" in kind.options_kind.model_fields and options.get("homing", "here") == "here":
         own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
@@ -378,4 +384,4 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
         )
     read_options(kind.options_kind, {**options, **own}, entry.device)
     motor = entry.model_copy(update={"options": {**entry.options, **own}})
-    return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}})
+    return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}}), settings

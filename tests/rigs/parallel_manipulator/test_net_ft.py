@@ -13,8 +13,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
     NetFtOptions,
-    Record,
-    Request,
     decode_records,
     decode_request,
     encode_record,
@@ -26,10 +24,10 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import Dat
 from tests.rigs.parallel_manipulator.pumps import VirtualLink, read_for
 
 REQUESTS = [
-    ("12 34 00 00 00 00 00 00", Request(Command.STOP)),
-    ("12 34 00 02 00 00 00 00", Request(Command.START_REALTIME)),
-    ("12 34 00 02 00 00 00 0A", Request(Command.START_REALTIME, 10)),
-    ("12 34 00 02 FF FF FF FF", Request(Command.START_REALTIME, 0xFFFFFFFF)),
+    ("12 34 00 00 00 00 00 00", (Command.STOP, 0)),
+    ("12 34 00 02 00 00 00 00", (Command.START_REALTIME, 0)),
+    ("12 34 00 02 00 00 00 0A", (Command.START_REALTIME, 10)),
+    ("12 34 00 02 FF FF FF FF", (Command.START_REALTIME, 0xFFFFFFFF)),
 ]
 ZERO = " ".join(["00"] * 24)
 # AT-2: bytes, sequences, status, values by 1e6 counts per unit, mark.
@@ -61,18 +59,17 @@ OPTIONS = NetFtOptions(**COUNTS)
 
 @pytest.mark.parametrize(("sent", "request_"), REQUESTS, ids=[sent for sent, _ in REQUESTS])
 def test_requests(sent, request_):
-    assert encode_request(request_) == bytes.fromhex(sent)
+    assert encode_request(*request_) == bytes.fromhex(sent)
     assert decode_request(bytes.fromhex(sent)) == request_
 
 
 @pytest.mark.parametrize(("sent", "rdt", "ft", "status", "values"), RECORDS, ids=[str(row[1]) for row in RECORDS])
 def test_records(sent, rdt, ft, status, values):
     ((*head, counts),) = decode_records(bytes.fromhex(sent)).tolist()
-    record = Record(*head, tuple(counts))
-    assert record[:3] == (rdt, ft, status)
-    assert OPTIONS.wrench(record.counts).tolist() == values
-    assert OPTIONS.counts(values).tolist() == list(record.counts)
-    assert encode_record(record) == bytes.fromhex(sent)
+    assert head == [rdt, ft, status]
+    assert OPTIONS.wrench(counts).tolist() == values
+    assert OPTIONS.counts(values).tolist() == list(counts)
+    assert encode_record(*head, counts) == bytes.fromhex(sent)
 
 
 def test_what_is_no_datagram_of_this_protocol_is_rejected():
@@ -111,12 +108,7 @@ def box(wrench=pressed, rate_hz=1000.0, faults=()):
 
 
 def start(emulator, now_s=0.0, records=0, command=Command.START_REALTIME):
-    return emulator.feed(encode_request(Request(command, records)), now_s)
-
-
-def records_in(sent):
-    """Return the records of what an emulator sent, in the order of arrival."""
-    return [Record(*r[:3], tuple(r[3])) for _, d in sent for r in decode_records(d).tolist()]
+    return emulator.feed(encode_request(command, records), now_s)
 
 
 @pytest.mark.parametrize(("asked", "sent"), [(1000, 1000), (7000, 7000), (3000, 3500), (999, 1000), (1, 1)])
@@ -134,7 +126,7 @@ def test_counts_end_by_themselves_and_stop_ends_the_rest():
     assert emulator.next_s() == np.inf
     start(emulator, 1.0)
     assert len(emulator.poll(1.05)) == 50
-    emulator.feed(encode_request(Request(Command.STOP)), 1.05)
+    emulator.feed(encode_request(Command.STOP), 1.05)
     assert emulator.poll(2.0) == []
     assert emulator.feed(b"hello", 2.0) == []
 

@@ -137,7 +137,7 @@ def test_forces_are_computed_with_the_age_that_the_force_may_have():
 def test_limits_are_stated_once():
     file = file_of(devices__motor__options__upper_m=0.004)
     with pytest.raises(UsageError, match="upper_m"):
-        with_limits(file, settings_of(file), load_registry())
+        with_limits(file, load_registry())
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from tactbench.plugin import RigError, load_registry
 from tactbench.plugin.devices import Beat, CommandKind, RigFile, ScenePhysics
-from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
+from tactbench.rigs.parallel_manipulator.kinematics import forward, solve_inverse
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
@@ -28,7 +28,7 @@ def true_place_m(session):
     """Return where the platform stands, whatever its drives count: they were switched on at the home place."""
     delta = session.settings.manipulator
     away = [drives(session)[name].position_m for name in JOINTS]
-    return forward(delta, inverse(delta, HOME_M) + away)
+    return forward(delta, solve_inverse(delta, HOME_M)[0] + away)
 
 
 class Force:

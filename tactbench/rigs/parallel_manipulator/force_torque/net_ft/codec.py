@@ -7,9 +7,10 @@ core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -85,45 +86,25 @@ class Command(IntEnum):
     START_REALTIME = 0x0002
 
 
-class Request(NamedTuple):
-    """One request."""
-
-    command: Command
-    records: int = 0
-    """Their number; 0: until stopped."""
+def encode_request(command: Command, records: int = 0) -> bytes:
+    """Return the 8 bytes of a request for so many records; 0: until stopped."""
+    return _REQUEST.pack(_HEADER, command, records)
 
 
-class Record(NamedTuple):
-    """One record."""
-
-    rdt_sequence: int
-    """Counts records sent, modulo 2^32."""
-    ft_sequence: int
-    """Counts the sensor's own samples, modulo 2^32."""
-    status: int
-    counts: tuple[int, int, int, int, int, int]
-    """Fx, Fy, Fz, Tx, Ty, Tz."""
-
-
-def encode_request(request: Request) -> bytes:
-    """Return the 8 bytes of a request."""
-    return _REQUEST.pack(_HEADER, request.command, request.records)
-
-
-def decode_request(data: bytes) -> Request:
-    """Return the request in a datagram; raises DatagramError if there is none."""
+def decode_request(data: bytes) -> tuple[Command, int]:
+    """Return command and number of records in a datagram; raises DatagramError if it is no request."""
     try:
         header, command, count = _REQUEST.unpack(data)
         if header == _HEADER:
-            return Request(Command(command), count)
+            return Command(command), count
     except (struct.error, ValueError):
         pass
     raise DatagramError(f"{data!r} is no request of {_REQUEST.size} bytes, header {_HEADER:04X} and a known command.")
 
 
-def encode_record(record: Record) -> bytes:
-    """Return the 36 bytes of a record."""
-    return _RECORD.pack(record.rdt_sequence, record.ft_sequence, record.status, *record.counts)
+def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Iterable[int]) -> bytes:
+    """Return the 36 bytes of a record: its number, the number of the sensor's sample, both modulo 2^32, six counts."""
+    return _RECORD.pack(rdt_sequence, ft_sequence, status, *counts)
 
 
 def decode_records(data: bytes) -> npt.NDArray[np.void]:
@@ -135,7 +116,7 @@ def decode_records(data: bytes) -> npt.NDArray[np.void]:
         If it is not one or more whole records.
     """
     if not data or len(data) % RECORD_BYTES:
-        raise DatagramError(f"Records of {RECORD_BYTES} bytes were expected, not {len(data)} bytes.")
+        raise DatagramError(f"{len(data)} bytes are no records of {RECORD_BYTES} bytes.")
     return np.frombuffer(data, RECORDS)
 
 

@@ -26,7 +26,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     STREAM,
     Command,
     NetFtOptions,
-    Request,
     decode_records,
     encode_request,
     quality,
@@ -95,7 +94,7 @@ class NetFtDriver(Driver):
             If the box sends at another rate than the options state, or several records in a datagram.
         """
         self._silence()
-        self._send(Command.START_REALTIME)
+        self.link.send(encode_request(Command.START_REALTIME))
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
         self._silence()
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
@@ -120,7 +119,7 @@ class NetFtDriver(Driver):
         self._silent = False
         self.link.discard()
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
-        self._send(Command.START_REALTIME)
+        self.link.send(encode_request(Command.START_REALTIME))
         self._sampling = True
         self._kept = [self._next()]
 
@@ -150,12 +149,9 @@ class NetFtDriver(Driver):
             with suppress(LinkError):
                 self._silence()
 
-    def _send(self, command: Command) -> None:
-        self.link.send(encode_request(Request(command)))
-
     def _silence(self) -> None:
         """Stop the box, and drop all that it sent before: records of an earlier start would seem to be of the next."""
-        self._send(Command.STOP)
+        self.link.send(encode_request(Command.STOP))
         with suppress(LinkTimeout):
             for _ in range(MOST_SILENCED):
                 self.link.receive(QUIET_S + 2 * self.options.every / SENSOR_RATE_HZ)

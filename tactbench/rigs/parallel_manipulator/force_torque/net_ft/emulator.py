@@ -29,7 +29,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
     NetFtOptions,
-    Record,
     decode_request,
     encode_record,
 )
@@ -86,12 +85,12 @@ class RdtEmulator(DeviceEmulator):
         sent = self.poll(now_s)
         assert isinstance(piece, bytes)
         try:
-            request = decode_request(piece)
+            command, records = decode_request(piece)
         except DatagramError:
             return sent
         sent += self._ended(self._now_s)
-        if request.command is Command.START_REALTIME:
-            self._left, self._sequence = request.records, 1
+        if command is Command.START_REALTIME:
+            self._left, self._sequence = records, 1
             # The first sample after the request: no sample is older than its request.
             self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
         return sent
@@ -116,12 +115,12 @@ class RdtEmulator(DeviceEmulator):
         saturated = any(abs(value) >= end for value, end in wrench) or any(
             fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
-        fx, fy, fz, tx, ty, tz = self.options.counts([min(max(value, -end), end) for value, end in wrench]).tolist()
+        counts = self.options.counts([min(max(value, -end), end) for value, end in wrench]).tolist()
         status = SATURATION | ERROR_SUMMARY if saturated else 0
-        record = Record(self._sequence, (sample + 1) % SEQUENCE_MODULUS, status, (fx, fy, fz, tx, ty, tz))
+        record = encode_record(self._sequence, (sample + 1) % SEQUENCE_MODULUS, status, counts)
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         self._next = sample + self.options.every
-        sent = self._on_the_way(encode_record(record), at_s)
+        sent = self._on_the_way(record, at_s)
         self._left -= 1
         return sent + self._ended(at_s) if self._left == 0 else sent
 
