@@ -36,14 +36,14 @@ from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import Twin
 registry = load_registry()
 name, changed, warm = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3] == "warm"
-effects = tuple(tactbench_effects())
+rig = Twin(tuple(tactbench_effects()))
+sensor, scenes = registry.sensors[name], [planned.scene for planned in registry.tasks["curvature"].spec.scenes]
 if changed:
     import dataclasses
-    from tactbench.rigs.twin.fidelity import DEFAULT
-    rig = Twin(effects, dataclasses.replace(DEFAULT, **changed))
-else:
-    rig = Twin(effects)
-sensor, scenes = registry.sensors[name], [planned.scene for planned in registry.tasks["curvature"].spec.scenes]
+    from tactbench.core.spec.scene import Simulation
+    from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
+    RUNGS["point"] = dataclasses.replace(DEFAULT, **changed)
+    scenes = [scene.simulated_as(Simulation(rung="point")) for scene in scenes]
 def record(seed):
     start = time.perf_counter()
     for scene in scenes:

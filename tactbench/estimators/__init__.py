@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from tactbench.plugin import EstimatorDescriptor, Summary, hookimpl
 
 TACTBENCH_API = 2
@@ -9,7 +11,6 @@ TACTBENCH_API = 2
 REGRESSION = ("regression",)
 CLASSIFICATION = ("classification",)
 BOTH = ("regression", "classification")
-EVENTS = ("events",)
 
 # k = 20 and lambda = 0.2 are what the paper's validation chose; the grid must hold them, and room on both sides.
 WINDOWS = (0, 5, 10, 20, 40)
@@ -22,147 +23,109 @@ TREES = (500, 100, 50, 10)
 @hookimpl
 def tactbench_estimators() -> list[EstimatorDescriptor]:
     """Offer the estimators."""
-    return [*_trivial(), *_linear(), *_curved(), *_forests(), *_slip_detectors()]
-
-
-def _trivial() -> list[EstimatorDescriptor]:
+    nothing: dict[str, Any] = {"looks_at": "nothing", "baseline": True}
     return [
-        EstimatorDescriptor(
-            name="mean", title="Mean of the training labels", kinds=REGRESSION, looks_at="nothing", baseline=True,
-            where="tactbench.estimators.trivial:mean", rehearsal={},
+        _estimator("mean", "Mean of the training labels", REGRESSION, "trivial:mean", **nothing),
+        _estimator(
+            "time-index", "Linear regression on the time index (the paper's lower bound)", REGRESSION,
+            "linear:least_squares", looks_at="time", baseline=True, linear=True,
         ),
-        EstimatorDescriptor(
-            name="time-index", title="Linear regression on the time index (the paper's lower bound)", kinds=REGRESSION,
-            looks_at="time", baseline=True, linear=True, where="tactbench.estimators.linear:least_squares",
-            rehearsal={},
+        _estimator(
+            "majority", "Most frequent class of the training labels", CLASSIFICATION, "trivial:majority", **nothing
         ),
-        EstimatorDescriptor(
-            name="majority", title="Most frequent class of the training labels", kinds=CLASSIFICATION,
-            looks_at="nothing", baseline=True, where="tactbench.estimators.trivial:majority", rehearsal={},
-        ),
-        EstimatorDescriptor(
-            name="chance", title="A class drawn uniformly", kinds=CLASSIFICATION, looks_at="nothing", baseline=True,
-            where="tactbench.estimators.trivial:chance", rehearsal={},
-        ),
-    ]  # fmt: skip
-
-
-def _linear() -> list[EstimatorDescriptor]:
-    return [
-        EstimatorDescriptor(
-            name="ols", title="Ordinary least squares on one sample", kinds=REGRESSION, linear=True,
-            where="tactbench.estimators.linear:least_squares", rehearsal={},
-        ),
-        EstimatorDescriptor(
-            name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
+        _estimator("chance", "A class drawn uniformly", CLASSIFICATION, "trivial:chance", **nothing),
+        _estimator("ols", "Ordinary least squares on one sample", REGRESSION, "linear:least_squares", linear=True),
+        _estimator(
+            "lasso", "Lasso on a mean-filtered window", REGRESSION, "linear:lasso", linear=True,
             params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
-            where="tactbench.estimators.linear:lasso", rehearsal={},
         ),
-        EstimatorDescriptor(
-            name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, linear=True,
+        _estimator(
+            "ridge", "Ridge regression on a mean-filtered window", REGRESSION, "linear:ridge", linear=True,
             params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS,
-            where="tactbench.estimators.linear:ridge", rehearsal={},
         ),
-        EstimatorDescriptor(
-            name="logistic", title="Logistic regression", kinds=CLASSIFICATION, linear=True, params={"C": 1.0},
-            where="tactbench.estimators.linear:logistic", rehearsal={},
+        _estimator(
+            "logistic", "Logistic regression", CLASSIFICATION, "linear:logistic", linear=True, params={"C": 1.0}
         ),
-        EstimatorDescriptor(
-            name="lda", title="Linear discriminant analysis", kinds=CLASSIFICATION, linear=True,
-            where="tactbench.estimators.linear:discriminant", rehearsal={},
+        _estimator("lda", "Linear discriminant analysis", CLASSIFICATION, "linear:discriminant", linear=True),
+        _estimator(
+            "knn", "k nearest neighbours", BOTH, "nonlinear:neighbours", linear=False, params={"n_neighbors": 15}
         ),
+        _estimator(
+            "svm", "Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", BOTH,
+            "nonlinear:support_vectors", linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
+        ),
+        _estimator(
+            "boosting", "Gradient boosting on histograms", BOTH, "nonlinear:boosting", linear=False,
+            params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31}, rehearsal={"max_iter": 2},
+        ),
+        _estimator(
+            "mlp", "Neural network with one hidden layer", BOTH, "nonlinear:perceptron", linear=False,
+            params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, rehearsal={"max_iter": 2},
+        ),
+        _estimator(
+            "extra-trees", "Extremely randomised trees", BOTH, "nonlinear:extra_trees", linear=False,
+            params={"n_estimators": 200, "min_samples_leaf": 2}, rehearsal={"n_estimators": 2},
+        ),
+        *(forest for trees in TREES for forest in _forests(trees)),
+        *_slip_detectors(),
     ]  # fmt: skip
 
 
-def _curved() -> list[EstimatorDescriptor]:
+def _estimator(name: str, title: str, kinds: tuple[str, ...], where: str, **more: Any) -> EstimatorDescriptor:
+    """Return a descriptor; unless stated otherwise its estimator is rehearsed as it is."""
+    fields = {"name": name, "title": title, "kinds": kinds, "where": f"tactbench.estimators.{where}", "rehearsal": {}}
+    return EstimatorDescriptor.model_validate(fields | more)
+
+
+def _forests(trees: int) -> list[EstimatorDescriptor]:
+    number = "" if trees == TREES[0] else f"-{trees}"
+    more = {"linear": False, "params": {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}}
     return [
-        EstimatorDescriptor(
-            name="knn", title="k nearest neighbours", kinds=BOTH, linear=False, params={"n_neighbors": 15},
-            where="tactbench.estimators.nonlinear:neighbours", rehearsal={},
+        _estimator(
+            f"forest{number}", f"Random forest of {trees} trees", BOTH, "nonlinear:forest",
+            rehearsal={"n_estimators": 2}, **more,
         ),
-        EstimatorDescriptor(
-            name="svm", title="Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", kinds=BOTH,
-            linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
-            where="tactbench.estimators.nonlinear:support_vectors", rehearsal={},
-        ),
-        EstimatorDescriptor(
-            name="boosting", title="Gradient boosting on histograms", kinds=BOTH, linear=False,
-            params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31},
-            where="tactbench.estimators.nonlinear:boosting", rehearsal={"max_iter": 2},
-        ),
-        EstimatorDescriptor(
-            name="mlp", title="Neural network with one hidden layer", kinds=BOTH, linear=False,
-            params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.nonlinear:perceptron",
-            rehearsal={"max_iter": 2},
+        _estimator(
+            f"forest-fast{number}", f"Random forest of {trees} trees by oneDAL (extra: fast)", BOTH,
+            "nonlinear:fast_forest", distributions=("scikit-learn-intelex", "daal"), rehearsal=None, **more,
         ),
     ]  # fmt: skip
-
-
-def _forests() -> list[EstimatorDescriptor]:
-    found = [
-        EstimatorDescriptor(
-            name="extra-trees", title="Extremely randomised trees", kinds=BOTH, linear=False,
-            params={"n_estimators": 200, "min_samples_leaf": 2}, where="tactbench.estimators.nonlinear:extra_trees",
-            rehearsal={"n_estimators": 2},
-        )
-    ]  # fmt: skip
-    for trees in TREES:
-        number = "" if trees == TREES[0] else f"-{trees}"
-        params = {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}
-        found += [
-            EstimatorDescriptor(
-                name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, linear=False,
-                params=params, where="tactbench.estimators.nonlinear:forest", rehearsal={"n_estimators": 2},
-            ),
-            EstimatorDescriptor(
-                name=f"forest-fast{number}", title=f"Random forest of {trees} trees by oneDAL (extra: fast)",
-                kinds=BOTH, linear=False, params=params, where="tactbench.estimators.nonlinear:fast_forest",
-                distributions=("scikit-learn-intelex", "daal"),
-            ),
-        ]  # fmt: skip
-    return found
 
 
 def _slip_detectors() -> list[EstimatorDescriptor]:
-    code = "tactbench.estimators.slip_detectors"
+    def detector(name: str, title: str, where: str, **more: Any) -> EstimatorDescriptor:
+        return _estimator(name, title, ("events",), f"slip_detectors:{where}", **{"rehearsal": None, **more})
+
+    trivial = {"looks_at": "nothing", "baseline": True, "threshold": 0.5}
+    band = Summary(measure="band-energy", band_hz=(30.0, 200.0), kinds=("ac_pressure",))
     return [
-        EstimatorDescriptor(
-            name="slip-never", title="No frame slips", kinds=EVENTS, looks_at="nothing", baseline=True, threshold=0.5,
-            where=f"{code}:never",
+        detector("slip-never", "No frame slips", "never", **trivial),
+        detector("slip-always", "Every frame slips", "always", **trivial),
+        detector(
+            "force-ratio", "Tangential over friction times normal force, by the reference: an oracle", "mean_feature",
+            looks_at="reference", baseline=True,
         ),
-        EstimatorDescriptor(
-            name="slip-always", title="Every frame slips", kinds=EVENTS, looks_at="nothing", baseline=True,
-            threshold=0.5, where=f"{code}:always",
+        detector(
+            "pac-band", "Energy of the vibration stream from 30 to 200 Hz", "mean_feature", summaries=(band,)
         ),
-        EstimatorDescriptor(
-            name="force-ratio", title="Tangential over friction times normal force, by the reference: an oracle",
-            kinds=EVENTS, looks_at="reference", baseline=True, where=f"{code}:mean_feature",
+        detector(
+            "wavelet-energy", "Wavelet details of the fastest stream (extra: wavelets)", "mean_feature",
+            frames_by="tactbench.estimators.slip_detectors:wavelet_amplitudes", distributions=("PyWavelets",),
         ),
-        EstimatorDescriptor(
-            name="pac-band", title="Energy of the vibration stream from 30 to 200 Hz", kinds=EVENTS,
-            summaries=(Summary(measure="band-energy", band_hz=(30.0, 200.0), kinds=("ac_pressure",)),),
-            where=f"{code}:mean_feature",
+        detector(
+            "frame-difference", "Mean step of the taxels from sample to sample", "mean_feature",
+            summaries=(Summary(measure="mean-step", kinds=("taxel",)),),
         ),
-        EstimatorDescriptor(
-            name="wavelet-energy", title="Wavelet details of the fastest stream (extra: wavelets)", kinds=EVENTS,
-            frames_by=f"{code}:wavelet_amplitudes", where=f"{code}:mean_feature", distributions=("PyWavelets",),
+        detector(
+            "slip-forest", "Random forest on how much channels moved", "forest", linear=False,
+            params={"n_estimators": 50, "min_samples_leaf": 5, "rows": 10_000}, rehearsal={"n_estimators": 2},
         ),
-        EstimatorDescriptor(
-            name="frame-difference", title="Mean step of the taxels from sample to sample", kinds=EVENTS,
-            summaries=(Summary(measure="mean-step", kinds=("taxel",)),), where=f"{code}:mean_feature",
+        detector(
+            "slip-svm", "Support vectors on how much channels moved", "support_vectors", linear=False,
+            params={"C": 1.0, "rows": 2_000}, rehearsal={},
         ),
-        EstimatorDescriptor(
-            name="slip-forest", title="Random forest on how much channels moved", kinds=EVENTS, linear=False,
-            params={"n_estimators": 50, "min_samples_leaf": 5, "rows": 10_000}, where=f"{code}:forest",
-            rehearsal={"n_estimators": 2},
-        ),
-        EstimatorDescriptor(
-            name="slip-svm", title="Support vectors on how much channels moved", kinds=EVENTS, linear=False,
-            params={"C": 1.0, "rows": 2_000}, where=f"{code}:support_vectors", rehearsal={},
-        ),
-        EstimatorDescriptor(
-            name="slip-spectrum", title="Logistic regression on the spectrum of the fastest stream", kinds=EVENTS,
-            linear=True, params={"C": 1.0, "rows": 10_000}, frames_by=f"{code}:spectrum", where=f"{code}:logistic",
-            rehearsal={},
+        detector(
+            "slip-spectrum", "Logistic regression on the spectrum of the fastest stream", "logistic", linear=True,
+            params={"C": 1.0, "rows": 10_000}, frames_by="tactbench.estimators.slip_detectors:spectrum", rehearsal={},
         ),
     ]  # fmt: skip

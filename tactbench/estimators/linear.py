@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.estimators.nonlinear import Wrapped
 from tactbench.plugin import FloatArray
 
 
@@ -47,14 +48,11 @@ def logistic(*, kind: str, seed: int, threads: int, C: float) -> Any:
     return LogisticRegression(C=C, solver="newton-cg", tol=1e-8, max_iter=2000)
 
 
-class Discriminant:
+class Discriminant(Wrapped):
     """Linear discriminant analysis without warnings where the means of all classes coincide.
 
     scikit-learn then divides zero by zero for the share of variance of each direction, which is not used here.
     """
-
-    def __init__(self, model: Any) -> None:
-        self.model = model
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Discriminant:
         """Learn from X (n, p) and y (n,); raises ValueError if no feature separates the classes."""
@@ -64,10 +62,6 @@ class Discriminant:
         except IndexError as error:  # scikit-learn looks for the first of no directions
             raise ValueError("no feature varies enough to tell the classes apart") from error
         return self
-
-    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
-        return np.asarray(self.model.predict(X))
 
 
 def discriminant(*, kind: str, seed: int, threads: int) -> Any:

@@ -12,7 +12,18 @@ import numpy.typing as npt
 from tactbench.plugin import Estimator, FloatArray, NotApplicable
 
 
-class Forest:
+class Wrapped:
+    """An estimator around another one, which answers for it."""
+
+    def __init__(self, model: Any) -> None:
+        self.model = model
+
+    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
+        """Return (n,) answers to X (n, p)."""
+        return np.asarray(self.model.predict(X))
+
+
+class Forest(Wrapped):
     """A forest whose predictions do not depend on the timing of threads.
 
     scikit-learn adds up the trees in the order in which its threads finish them, so that the last bits of a mean change
@@ -21,7 +32,7 @@ class Forest:
     """
 
     def __init__(self, model: Any, threads: int) -> None:
-        self.model = model
+        super().__init__(model)
         self.threads = threads
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Forest:
@@ -33,7 +44,7 @@ class Forest:
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
         """Return (n,) answers to X (n, p)."""
         if self.threads == 1 or len(X) < 100 * self.threads:
-            return np.asarray(self.model.predict(X))
+            return super().predict(X)
         with ThreadPoolExecutor(self.threads) as pool:
             return np.concatenate(list(pool.map(self.model.predict, np.array_split(X, self.threads))))
 
@@ -54,15 +65,12 @@ def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
     return Forest(make(random_state=seed, **params), threads)
 
 
-class FastForest:
+class FastForest(Wrapped):
     """A forest that raises an error when scikit-learn-intelex falls back to plain scikit-learn.
 
     The library does so silently for parameters that oneDAL does not support (more than 6024 trees, some criteria and
     weights). A row under this name would then be one of the plain forest.
     """
-
-    def __init__(self, model: Any) -> None:
-        self.model = model
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> FastForest:
         """Grow the trees on X (n, p) and y (n,).
@@ -85,7 +93,7 @@ class FastForest:
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
         """Return (n,) answers to X (n, p)."""
-        return np.asarray(self.model.predict(X)).reshape(len(X))
+        return super().predict(X).reshape(len(X))
 
 
 def fast_forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
@@ -122,20 +130,13 @@ def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:
     return make(early_stopping=False, random_state=seed, **params)
 
 
-class Neighbours:
+class Neighbours(Wrapped):
     """Nearest neighbours that use all rows where there are fewer than `n_neighbors`."""
-
-    def __init__(self, model: Any) -> None:
-        self.model = model
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Neighbours:
         """Keep X (n, p) and y (n,)."""
         self.model.set_params(n_neighbors=min(self.model.n_neighbors, len(X))).fit(X, y)
         return self
-
-    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
-        return np.asarray(self.model.predict(X))
 
 
 def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estimator:
@@ -150,7 +151,7 @@ def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estim
     return Neighbours(make(n_neighbors=n_neighbors, n_jobs=threads))
 
 
-class OfUnitSpread:
+class OfUnitSpread(Wrapped):
     """A regressor trained on y scaled to zero mean and unit standard deviation; it predicts in y's own unit.
 
     The width of a support-vector tube and the step of a gradient are numbers in the target's unit: without this a
@@ -158,7 +159,7 @@ class OfUnitSpread:
     """
 
     def __init__(self, model: Any) -> None:
-        self.model = model
+        super().__init__(model)
         self.mean, self.spread = 0.0, 1.0
 
     def fit(self, X: FloatArray, y: FloatArray) -> OfUnitSpread:
@@ -173,14 +174,14 @@ class OfUnitSpread:
         return answers
 
 
-class EveryNth:
+class EveryNth(Wrapped):
     """An estimator trained on every n-th row, n such that at most `rows` are left: its fit grows faster than the rows.
 
     Rows that follow each other in time are nearly copies, so that every n-th one leaves out less than a random draw.
     """
 
     def __init__(self, model: Any, rows: int) -> None:
-        self.model = model
+        super().__init__(model)
         self.rows = rows
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> EveryNth:
@@ -188,10 +189,6 @@ class EveryNth:
         step = -(-len(X) // self.rows)
         self.model.fit(X[::step], y[::step])
         return self
-
-    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
-        return np.asarray(self.model.predict(X))
 
 
 def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Estimator:

@@ -36,22 +36,6 @@ class Hertz:
 
 
 @dataclass(frozen=True)
-class FlatPunch:
-    """A rigid cylinder of flat end on a half-space (section 3.8)."""
-
-    punch_radius_mm: float
-    modulus_mpa: float
-
-    def depth_mm(self, force_n: float) -> float:
-        return force_n / (2 * self.punch_radius_mm * self.modulus_mpa)
-
-    def pressure_mpa(self, force_n: float, r_mm: np.ndarray) -> np.ndarray:
-        """Return the pressure at distances below the radius."""
-        a = self.punch_radius_mm
-        return force_n / (2 * math.pi * a * np.sqrt(a**2 - r_mm**2))
-
-
-@dataclass(frozen=True)
 class CattaneoMindlin:
     """A pressed sphere that is then pushed sideways below slip (section 7.2): inside a circle it sticks.
 

@@ -33,16 +33,6 @@ def test_a_standard_linear_solid_under_a_step_of_stress():
     np.testing.assert_allclose(found[1:], expected[1:], rtol=ROUNDING)
 
 
-def test_the_lag_behind_a_curve_is_of_second_order():
-    """Straight pieces under ``sin(w t)``."""
-    omega, tau, errors = 1.0, 2.0, []
-    for n in (200, 400, 800):
-        t_s, x = np.linspace(0, 60, n + 1), omega * tau
-        expected = (np.sin(omega * t_s) - x * np.cos(omega * t_s) + x * np.exp(-t_s / tau)) / (1 + x * x)
-        errors.append(float(np.abs(lag(t_s, np.sin(omega * t_s), tau) - expected).max()))
-    assert 1.9 <= order(errors) <= 2.1
-
-
 def test_a_heated_core_under_a_growing_contact_is_of_second_order():
     """Against its solution as an integral, taken by Gauss's rule."""
     rate, indenter_c, start_c, end_s = 2e-4, 5.0, 57.0, 60.0

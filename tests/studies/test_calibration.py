@@ -11,7 +11,7 @@ from tests.conftest import ROOT
 sys.path.append(str(ROOT))  # behind everything installed
 
 from studies.calibration.__main__ import DOCUMENT, HERE, RESULTS, calibrate, document
-from studies.calibration.analysis import accept, by_fitted, partial_rank_correlations, share
+from studies.calibration.analysis import accept, by_fitted
 from studies.calibration.draws import Draw, parameters_of, read, roughness, write
 
 PROCEDURE = yaml.safe_load("""
@@ -82,19 +82,6 @@ def test_near_draws_are_accepted_and_the_nearest_where_they_are_few():
     assert ([draw.number for draw in near.draws], near.near, near.reach) == ([3, 4, 5], 3, 2.0)
     few = by_fitted({"published": [target], "tolerance": 0.5, "at_least": 5}, draws)
     assert ([draw.number for draw in few.draws], few.near, few.reach) == ([2, 3, 4, 5, 6], 1, 4.0)
-
-
-def test_partial_rank_correlations_hold_the_other_nuisances():
-    rng = np.random.default_rng(1)
-    X = rng.normal(size=(400, 3))
-    found = partial_rank_correlations(X, np.column_stack([np.exp(X[:, 0]) - 0.01 * X[:, 1], rng.normal(size=400)]))
-    assert found[0, 0] > 0.99
-    assert abs(found[0, 2]) < 0.15
-    assert np.abs(found[1]).max() < 0.15
-
-
-def test_shares_have_wilsons_interval():
-    assert share([True] * 18 + [False] * 2) == pytest.approx((0.9, 0.699, 0.972), abs=1e-3)
 
 
 def test_roughness_is_the_white_noise_of_predictions_and_of_no_rise():

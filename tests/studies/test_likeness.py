@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from studies.likeness.__main__ import PAGE, tables, written
-from studies.likeness.figures import BIOTAC, ICUB, STATISTICS, States, band_rms, crossing, participation
+from studies.likeness.__main__ import PAGE, table, written
+from studies.likeness.figures import BIOTAC, ICUB, STATISTICS, States, crossing
 from studies.likeness.patterns import Trial, compare_plates, correlations, explained, predicted
 
 
@@ -54,12 +54,7 @@ def test_a_trial_is_predicted_by_one_of_the_same_finger_whichever_way_its_axes_p
 def test_the_page_says_what_the_simulation_gives():
     page = PAGE.read_text(encoding="utf-8")
     with threadpool_limits(1):
-        assert written(page, dict(tables(None, None))) == page, "python -m studies.likeness --write"
-
-
-def test_as_many_channels_take_part_as_change():
-    assert participation(np.full((1, 7), -5.0)) == pytest.approx(7.0)
-    assert participation(np.array([[40.0, 40.0, 2.9]])) == pytest.approx(2.0)
+        assert written(page, {"icub": table("icub", ICUB)}) == page, "python -m studies.likeness --write"
 
 
 def test_the_crossing_is_where_falling_turns_into_rising():
@@ -67,12 +62,6 @@ def test_the_crossing_is_where_falling_turns_into_rising():
     # Linear in the angle: exact up to the fill of the bins.
     assert crossing(angle, angle - 37.0) == pytest.approx(37.0, abs=0.1)
     assert np.isnan(crossing(angle, angle + 1.0))
-
-
-def test_a_tone_lives_in_its_band_with_its_rms():
-    tone = 5.0 + 3.0 * np.sin(2 * np.pi * 40.0 * np.arange(2200) / 2200.0)
-    assert band_rms(tone, 2200.0, (30.0, 100.0)) == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
-    assert band_rms(tone, 2200.0, (100.0, 1000.0)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_states_are_those_within_a_band_of_pressure():

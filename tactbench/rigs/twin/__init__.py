@@ -8,8 +8,6 @@ from tactbench.plugin.simulation import EffectDescriptor
 TACTBENCH_API = 2
 
 _HERE = "tactbench.rigs.twin"
-_DRIFT, _NOISE = ("drift",), ("noise",)
-_LOAD, _REFERENCE = ("load",), ("reference-force",)
 
 
 @hookimpl
@@ -32,82 +30,51 @@ def tactbench_rigs() -> list[RigDescriptor]:
 def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
-        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), (*_LOAD, *_REFERENCE)),
-        _effect("contact", "Normal contact", "contact.stages:press_skin", ("load", "core"), ("skin",)),
-        _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
-        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
-        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", (), ("shear",)),
-        _channels("gain", "Scatter of gains", produces=("gain",)),
-        _effect("creep", "Creep of the skin", "effects.creep:apply", ("load", "skin", "gain"), ("effective-force",)),
+        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", "", "load reference-force"),
+        _effect("contact", "Normal contact", "contact.stages:press_skin", "load core", "skin"),
+        _effect("core", "Touch-down on the core", "contact.core:with_core", "", "core"),
+        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", "skin", "dc_pressure fluid"),
+        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", "", "shear"),
+        _channels("gain", "Scatter of gains", produces="gain"),
+        _effect("creep", "Creep of the skin", "effects.creep:apply", "load skin gain", "effective-force"),
         _effect(
-            "transduction",
-            "Transduction",
-            "contact.stages:read_skin",
-            ("skin", "gain", "effective-force", "vibration", "shear", "slip"),
-            ("taxel", "reading"),
+            "transduction", "Transduction", "contact.stages:read_skin",
+            "skin gain effective-force vibration shear slip", "taxel reading",
         ),
-        _effect("contact-heat", "Heat through the contact", "effects.heat:contact_heat", ("skin",), ("warmth",)),
+        _effect("contact-heat", "Heat through the contact", "effects.heat:contact_heat", "skin", "warmth"),
         _effect(
-            "dc-temperature",
-            "Temperature of the core",
-            "effects.heat:dc_temperature",
-            ("warmth",),
-            ("dc_temperature", "reading"),
+            "dc-temperature", "Temperature of the core", "effects.heat:dc_temperature", "warmth",
+            "dc_temperature reading",
         ),
         _effect(
-            "ac-temperature",
-            "Rate of the core's temperature",
-            "effects.heat:ac_temperature",
-            ("warmth",),
-            ("ac_temperature", "reading"),
+            "ac-temperature", "Rate of the core's temperature", "effects.heat:ac_temperature", "warmth",
+            "ac_temperature reading",
         ),
         _effect(
-            "thermal-drift",
-            "Drift with the fluid's temperature",
-            "effects.heat:thermal_drift",
-            ("warmth", "taxel"),
-            ("disturbance",),
-            ("heat",),
+            "thermal-drift", "Drift with the fluid's temperature", "effects.heat:thermal_drift", "warmth taxel",
+            "disturbance", "heat",
         ),
         _channels("rest-spread", "Scatter of rest levels"),
         _channels("unit-rest", "Rest levels of another unit"),
-        _channels("offset", "Offsets", groups=_DRIFT),
-        _channels("warm-up", "Shared warm-up", groups=_DRIFT),
-        _channels("wander", "Free drift", groups=_DRIFT),
-        _channels("white-noise", "White noise", groups=_NOISE),
+        _channels("offset", "Offsets", group="drift"),
+        _channels("warm-up", "Shared warm-up", group="drift"),
+        _channels("wander", "Free drift", group="drift"),
+        _channels("white-noise", "White noise", group="noise"),
+        _effect("friction", "Friction", "effects.friction:apply", "skin", "slip tangential-force reference-force"),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", "slip skin", "vibration"),
         _effect(
-            "friction",
-            "Friction",
-            "effects.friction:apply",
-            ("skin",),
-            ("slip", "tangential-force", *_REFERENCE),
+            "ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", "skin fluid vibration",
+            "ac_pressure reading",
         ),
-        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", ("slip", "skin"), ("vibration",)),
-        _effect(
-            "ac-pressure",
-            "Dynamic pressure",
-            "effects.ac_pressure:apply",
-            ("skin", "fluid", "vibration"),
-            ("ac_pressure", "reading"),
+        _channels("hum", "Hum of dynamic pressure", group="noise"),
+        _channels("converter", "Converter", "reading disturbance", "stored"),
+        _channels(
+            "force-noise", "Noise of the force sensor", "load tangential-force", "raw-force reference-force", "noise"
         ),
-        _channels("hum", "Hum of dynamic pressure", groups=_NOISE),
-        _channels("converter", "Converter", ("reading", "disturbance"), ("stored",)),
-        _effect(
-            "force-noise",
-            "Noise of the force sensor",
-            "effects.force_sensor:noise",
-            (*_LOAD, "tangential-force"),
-            ("raw-force", *_REFERENCE),
-            _NOISE,
+        _channels(
+            "force-filter", "Low-pass of the recorded force", "load tangential-force raw-force", "reference-force"
         ),
-        _effect(
-            "force-filter",
-            "Low-pass of the recorded force",
-            "effects.force_sensor:low_pass",
-            (*_LOAD, "tangential-force", "raw-force"),
-            _REFERENCE,
-        ),
-    ]
+    ]  # fmt: skip
 
 
 @hookimpl
@@ -140,30 +107,19 @@ def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescrip
     return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
 
 
-def _effect(
-    name: str,
-    title: str,
-    where: str,
-    consumes: tuple[str, ...],
-    produces: tuple[str, ...],
-    groups: tuple[str, ...] = (),
-) -> EffectDescriptor:
+def _effect(name: str, title: str, where: str, consumes: str, produces: str, group: str = "") -> EffectDescriptor:
     return EffectDescriptor(
         name=name,
         title=title,
         where=f"{_HERE}.{where}",
-        consumes=consumes,
-        produces=produces,
-        groups=groups,
+        consumes=tuple(consumes.split()),
+        produces=tuple(produces.split()),
+        groups=tuple(group.split()),
         called_for=f"{_HERE}.effects.called_for:{name.replace('-', '_')}",
     )
 
 
 def _channels(
-    name: str,
-    title: str,
-    consumes: tuple[str, ...] = (),
-    produces: tuple[str, ...] = ("disturbance",),
-    groups: tuple[str, ...] = (),
+    name: str, title: str, consumes: str = "", produces: str = "disturbance", group: str = ""
 ) -> EffectDescriptor:
-    return _effect(name, title, f"effects.channels:{name.replace('-', '_')}", consumes, produces, groups)
+    return _effect(name, title, f"effects.channels:{name.replace('-', '_')}", consumes, produces, group)

@@ -10,10 +10,8 @@ import numpy as np
 from pydantic import BaseModel
 
 from tactbench.plugin import (
-    ChannelSpec,
     FloatArray,
     IndenterDescriptor,
-    NotApplicable,
     Quantity,
     RigError,
     Scene,
@@ -30,11 +28,12 @@ _OWN_CLOCK_FROM = 2.0
 """A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 MOST_SAMPLES = 20_000_000
 """Limit on the samples of a stream: two and a half hours at 2200 Hz, 160 MB per channel and effect."""
-_NOT_BELOW_ZERO = ("scatter", "tilt_scatter", "start", "end", "hold", "duration", "since_power_on", "force_noise")
-"""Fields of a scene that must not be negative."""
-_LOOP = ("proportional", "integral", "delay", "motor_lag", "resolution")
-"""Fields of a force loop that must not be negative."""
-_ABOVE_ZERO = ("force_filter", "cutoff", "rate", "speed", "acceleration")
+_NOT_BELOW_ZERO = (
+    "scatter", "tilt_scatter", "start", "end", "hold", "since_power_on", "force_noise",
+    "proportional", "integral", "delay", "motor_lag", "resolution",
+)  # fmt: skip
+"""Fields of a scene, the force loop included, that must not be negative."""
+_ABOVE_ZERO = ("duration", "force_filter", "cutoff", "rate", "speed", "acceleration")
 """Fields of a scene that must be positive."""
 
 
@@ -51,12 +50,12 @@ def prepare(
     Raises
     ------
     RigError
-        If a number of the scene is not valid, its force profile or its clocks cannot be carried out, or its indenter
-        names no installed shape.
+        If a number of the scene is not valid, its clocks cannot be carried out, or its indenter names no installed
+        shape.
     UsageError
         If the shape has no such dimension.
     NotApplicable
-        If the sensor declares no skin, or no scenario of the name in the scene's simulation.
+        If the sensor has no scenario of the name in the scene's simulation.
     """
     check_numbers(scene)
     sensor = handled(sensor, scene)
@@ -105,15 +104,7 @@ def carried_out(
 def _load(scene: Scene) -> tuple[FloatArray, Load]:
     """Return the reference clock and the true force: held at the start, then straight to the end."""
     profile = scene.profile
-    duration, hold = profile.duration.to("s"), profile.hold_s
-    start, end = profile.corners[1][0], profile.corners[1][-1]
-    if not duration > 0 or hold < 0 or min(start, end) < 0:
-        raise RigError(
-            f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
-            f"{hold:g} s of rest.",
-            hint="Duration must be positive, hold and forces at least zero.",
-        )
-    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
+    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
     return t_s, Load(*(np.array(corner) for corner in profile.corners))
 
 
@@ -146,46 +137,33 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
             channels=channels,
             t_s=own,
             force_n=load.at(own),
-            readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
+            readings=np.tile([0.0 if one.rest is None else one.rest.to(one.unit) for one in channels], (own.size, 1)),
             quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
         )
-
-
-def _rest(channel: ChannelSpec) -> float:
-    return 0.0 if channel.rest is None else channel.rest.to(channel.unit)
 
 
 def _place(run: Synthesis) -> Contact:
     """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
     placement = run.scene.placement
     commanded_x, commanded_s = commanded_place_mm(run.sensor.spec, run.scene)
-    draws = run.of_recording("placement").standard_normal(4)
-    off_x, off_s = placement.scatter.to("mm") * draws[:2]
-    x, s = commanded_x + off_x, commanded_s + off_s
-    run.drawn.update(placed_x_mm=float(x), placed_s_mm=float(s))
-    more_x, more_s = placement.tilt_scatter.to("rad") * draws[2:]
-    angle_x, angle_s = placement.tilt_x.to("rad") + more_x, placement.tilt_s.to("rad") + more_s
-    if placement.tilt_scatter.value:
+    draws = run.of_recording("placement").standard_normal(4).tolist()
+    scatter, tilt_scatter = placement.scatter.to("mm"), placement.tilt_scatter.to("rad")
+    x, s = commanded_x + scatter * draws[0], commanded_s + scatter * draws[1]
+    run.drawn.update(placed_x_mm=x, placed_s_mm=s)
+    angle_x = placement.tilt_x.to("rad") + tilt_scatter * draws[2]
+    angle_s = placement.tilt_s.to("rad") + tilt_scatter * draws[3]
+    if tilt_scatter:
         run.drawn.update(tilted_x_deg=math.degrees(angle_x), tilted_s_deg=math.degrees(angle_s))
-    tilt_x, tilt_s = math.tan(angle_x), math.tan(angle_s)
-    return replace(run.contact, x_mm=float(x), s_mm=float(s), tilt_x=tilt_x, tilt_s=tilt_s)
+    return replace(run.contact, x_mm=x, s_mm=s, tilt_x=math.tan(angle_x), tilt_s=math.tan(angle_s))
 
 
 def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:
-    """Return where the apex of the indenter is to meet the skin, (x, s): the nominal point and the scene's offset.
-
-    Raises
-    ------
-    NotApplicable
-        If the sensor declares no skin.
-    """
-    if spec.skin is None:
-        raise NotApplicable(f"{spec.name} declares no skin.")
+    """Return where the apex of the indenter is to meet the skin, (x, s): the nominal point and the scene's offset."""
+    assert spec.skin is not None  # a scene is planned before it is prepared
     sheet, placement = spec.skin.sheet, scene.placement
-    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
-    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
-    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
-    return nominal_x + placement.x.to("mm"), nominal_s + placement.s.to("mm")
+    x, s = (spec.parameters.get(f"contact_{axis}") for axis in "xs")
+    nominal_x = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2 if x is None else x.to("mm")
+    return nominal_x + placement.x.to("mm"), (0.0 if s is None else s.to("mm")) + placement.s.to("mm")
 
 
 def check_numbers(scene: Scene) -> None:
@@ -206,7 +184,7 @@ def check_numbers(scene: Scene) -> None:
         )
     for name, value, text in _numbers(scene, ()):
         positive = name[-1] in _ABOVE_ZERO
-        signed = not positive and name[-1] not in (*_NOT_BELOW_ZERO, *_LOOP)
+        signed = not positive and name[-1] not in _NOT_BELOW_ZERO
         flat = name[-1] == "radius" and value == math.inf
         if not (math.isfinite(value) or flat) or (value < 0 and not signed) or (value == 0 and positive):
             raise RigError(

@@ -31,13 +31,11 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
-from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
 from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
-ROWS_PER_BLOCK = 1000
 _CURVE_POINTS = 4001
 """Points of a press curve; interpolated linearly, the force is off by less than 1e-4 of the largest."""
 REFERENCE_STREAM = "force_torque"
@@ -83,20 +81,10 @@ class TwinAcquisition:
         return 1e-3 * (depths_mm - depths_mm[0]), forces_n
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield blocks, the streams in turn, each up to the same moment, as samples taken at once would arrive."""
-        reference = self.samples[REFERENCE_STREAM].t_ns
-        given = dict.fromkeys(self.samples, 0)
-        for start in range(0, reference.size, ROWS_PER_BLOCK):
-            last = start + ROWS_PER_BLOCK >= reference.size
-            until = None if last else reference[start + ROWS_PER_BLOCK]
-            for stream in (*self.streams, *self.reference):
-                own, first = self.samples[stream.name], given[stream.name]
-                end = own.t_ns.size if until is None else int(np.searchsorted(own.t_ns, until))
-                rows = slice(first, end)
-                given[stream.name] = end
-                if end > first:
-                    quality = None if own.quality is None else own.quality[rows]
-                    yield Block(stream=stream.name, t_ns=own.t_ns[rows], data=own.data[rows], quality=quality)
+        """Yield one block of each stream."""
+        for stream in (*self.streams, *self.reference):
+            t_ns, data, quality = self.samples[stream.name]
+            yield Block(stream=stream.name, t_ns=t_ns, data=data, quality=quality)
 
 
 class Twin:
@@ -106,8 +94,6 @@ class Twin:
     ----------
     effects
         Candidates for every scene; a plan takes from them what the scene calls for.
-    fidelity
-        How finely contacts are resolved.
     indenters
         All installed shapes of indenters.
     named_effects
@@ -117,13 +103,11 @@ class Twin:
     def __init__(
         self,
         effects: Sequence[EffectDescriptor],
-        fidelity: Fidelity = DEFAULT,
         indenters: Sequence[IndenterDescriptor] = (),
         named_effects: Sequence[EffectDescriptor] = (),
     ) -> None:
         self.effects = tuple(effects)
         self.named_effects = tuple(named_effects)
-        self.fidelity = fidelity
         self.indenters = tuple(indenters)
 
     def _candidates(self, sensor: SensorDescriptor, scene: Scene) -> Sequence[EffectDescriptor]:
@@ -163,7 +147,7 @@ class Twin:
             If the contact cannot be resolved or solved.
         """
         plan = self.plan(sensor, scene)
-        yield _acquisition(carried_out(sensor, scene, seed, plan, self.fidelity, self.indenters), plan)
+        yield _acquisition(carried_out(sensor, scene, seed, plan, indenters=self.indenters), plan)
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
@@ -173,16 +157,15 @@ class Twin:
         runs = []
         for _ in range(rounds + 1):
             forget_tables()
-            runs.append(carried_out(sensor, scene, 1, plan, DEFAULT, self.indenters))
+            runs.append(carried_out(sensor, scene, 1, plan, indenters=self.indenters))
         del runs[0]  # its times include imports
         forget_tables()  # the next recording of the scene solves its contact itself
-        rows = []
-        for entry in plan.settled(runs[-1].settled):
-            if entry.included and entry.effect not in plan.lent:
-                rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))
-            else:
-                rows.append(Explained(entry, None, "part of the contact" if entry.included else ""))
-        return rows
+        return [
+            Explained(entry, None, "part of the contact" if entry.included else "")
+            if not entry.included or entry.effect in plan.lent
+            else Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs))
+            for entry in plan.settled(runs[-1].settled)
+        ]
 
 
 def build(context: RigContext) -> Twin:
@@ -221,6 +204,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         samples[place.name] = Samples(_ns(run.t_s), values, quality)
         places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
+    shape = run.contact.shape
     return TwinAcquisition(
         streams=tuple(streams),
         reference=(reference, *places),
@@ -228,7 +212,8 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         assumptions={
             "contact_x_mm": contact_x,
             "contact_s_mm": contact_s,
-            **_sizes(run),
+            # A scene may leave the dimensions of a shape to the shape itself.
+            **{f"indenter {name}": size for name, size in (() if shape is None else shape.sizes)},
             **_stated(run.scene, run.sensor.spec),
             **_simulated_as(run.scene),
         },
@@ -259,22 +244,15 @@ def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArr
     return stream, np.tile(place_m, (run.t_s.size, 1)), np.column_stack([quality, quality])
 
 
-def _sizes(run: Synthesis) -> dict[str, Scalar]:
-    """Return the dimensions of an indenter that is neither flat nor a cap: a scene may leave them to its shape."""
-    shape = run.contact.shape
-    return {} if shape is None else {f"indenter {name}": size for name, size in shape.sizes}
-
-
 def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]]:
     """Return the measured force across the surface and along its motion; nothing where nothing slides."""
     if run.scene.slide is None or "fx" not in run.reference_more:
         return {}
     angle = run.scene.slide.direction.to("rad")
     along = math.cos(angle) * run.reference_more["fx"][1] + math.sin(angle) * run.reference_more["fy"][1]
-    measured = {"normal": run.reference_n, "tangential": along}
     return {
-        name: (ChannelSpec(name=name, kind="force", unit="N", sign=1 if name == "normal" else 0), values)
-        for name, values in measured.items()
+        "normal": (ChannelSpec(name="normal", kind="force", unit="N", sign=1), run.reference_n),
+        "tangential": (ChannelSpec(name="tangential", kind="force", unit="N"), along),
     }
 
 
@@ -303,8 +281,10 @@ def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
 def _simulated_as(scene: Scene) -> dict[str, Scalar]:
     """Return the scene's settings of the simulation that differ from the default: printed with every row."""
     own = scene.simulation
-    found = {"effects": " ".join(own.effects) or None, "rung": own.rung, "tolerance_count": own.tolerance}
-    found["scenario"] = own.scenario
+    found = {
+        "effects": " ".join(own.effects) or None, "rung": own.rung, "tolerance_count": own.tolerance,
+        "scenario": own.scenario,
+    }  # fmt: skip
     return {name: value for name, value in found.items() if value is not None}
 
 

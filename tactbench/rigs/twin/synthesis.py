@@ -163,8 +163,6 @@ class Synthesis:
     """Estimated error of the rung in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """Random draws and achieved accuracies that the recording keeps."""
-    clock: Callable[[], float] = time.perf_counter
-    """Monotonic clock, in seconds."""
     spent_s: dict[str, float] = field(default_factory=dict)
     """Seconds spent on each applied effect."""
     elsewhere_s: float = 0.0
@@ -172,9 +170,9 @@ class Synthesis:
 
     def apply(self, effect: EffectDescriptor) -> None:
         """Apply one effect, and count the seconds that it takes."""
-        began, self.elsewhere_s = self.clock(), 0.0
+        began, self.elsewhere_s = time.perf_counter(), 0.0
         load_object(effect.where)(self)
-        own = self.clock() - began - self.elsewhere_s
+        own = time.perf_counter() - began - self.elsewhere_s
         self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
 
     def follow(self, load: Load) -> None:

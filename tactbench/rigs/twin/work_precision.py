@@ -7,7 +7,7 @@ import functools
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -37,13 +37,10 @@ LOADS = 12
 GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
 NODES = (9, 11, DEFAULT.most_nodes, 32)
 """Limits on the nodes of a load table; refinement ends earlier where noise hides the remaining error."""
-ROUNDS = 5
 _REFERENCE = RUNGS["reference"]
 
 
-def study(
-    sensor: SensorDescriptor, clock: Callable[[], float] = time.process_time, *, rounds: int = ROUNDS
-) -> CostStudy:
+def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
     """Return the jobs that measure the diagram of one sensor; every recording is timed `rounds` times.
 
     A job raises the error of a rung that does not support the skin.
@@ -67,7 +64,7 @@ def study(
         jobs=[
             CostJob(
                 label,
-                functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock, rounds),
+                functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, rounds),
                 _rung(fidelity),
             )
             for family, label, fidelity in _ways(sensor)
@@ -88,13 +85,10 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
     for nodes in NODES[:3]:
         yield named("closed form", dataclasses.replace(RUNGS["closed-form"], most_nodes=nodes))
     for factor in GRIDS:
-        for nodes in NODES:
-            if factor == 1.0 or nodes == DEFAULT.most_nodes or (factor > 1.0 and nodes > DEFAULT.most_nodes):
-                aim = DEFAULT.table_tolerance_factor if nodes <= DEFAULT.most_nodes else 1 / 3
-                yield named(
-                    "newton",
-                    dataclasses.replace(DEFAULT, cells_factor=factor, most_nodes=nodes, table_tolerance_factor=aim),
-                )
+        for nodes in NODES if factor == 1.0 else NODES[2:]:
+            aim = DEFAULT.table_tolerance_factor if nodes <= DEFAULT.most_nodes else 1 / 3
+            finer = dataclasses.replace(DEFAULT, cells_factor=factor, table_tolerance_factor=aim)
+            yield named("newton", dataclasses.replace(finer, most_nodes=nodes))
     if isinstance(skin, FluidBackedShell):
         for refinement in (1, 3):
             yield named(f"film x{refinement}", dataclasses.replace(DEFAULT, conduction_refinement=refinement))
@@ -112,7 +106,6 @@ def _measured(
     label: str,
     fidelity: Fidelity,
     truth: dict[float, FloatArray],
-    clock: Callable[[], float],
     rounds: int,
 ) -> list[CostPoint]:
     seconds: list[float] = []
@@ -124,9 +117,9 @@ def _measured(
             truth[radius] = _true(sensor, scene, plan, names)
         for _ in range(rounds):
             forget_tables()
-            began = clock()
+            began = time.process_time()
             run = carried_out(sensor, scene, 1, plan, fidelity)
-            seconds.append(clock() - began)
+            seconds.append(time.process_time() - began)
         table = skin_under_load(run)
         differences.append(table(_loads()) - table.readings[0] - truth[radius])
     apart = np.concatenate(differences)

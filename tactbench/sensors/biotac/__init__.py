@@ -15,7 +15,7 @@ def tactbench_sensors() -> list[SensorDescriptor]:
         SensorDescriptor(
             spec=SPEC,
             transducer="tactbench.sensors.biotac.transduction:build",
-            driver="tactbench.sensors.biotac.driver:build",
+            driver="tactbench.sensors.biotac.driver:BioTacDriver",
             emulator="tactbench.sensors.biotac.emulator:build_emulator",
             emulated_link="spi",
             log_reader="tactbench.sensors.biotac.text_log:read_log",

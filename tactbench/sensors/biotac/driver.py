@@ -44,7 +44,6 @@ from __future__ import annotations
 import contextlib
 from collections import Counter, deque
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from tactbench.plugin import Block, RigError, Source, StreamSpec
 from tactbench.plugin.devices import (
@@ -56,6 +55,7 @@ from tactbench.plugin.devices import (
     SpiLink,
     SpiReply,
     SpiStep,
+    open_for,
     read_options,
 )
 from tactbench.sensors.biotac.codec import (
@@ -68,11 +68,8 @@ from tactbench.sensors.biotac.codec import (
     property_command,
     property_text,
 )
-from tactbench.sensors.biotac.frames import FrameBatches, counted, streams_of
+from tactbench.sensors.biotac.frames import FrameBatches, streams_of
 from tactbench.sensors.biotac.options import BioTacOptions
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import Link
 
 PATIENCE_S = 0.5
 """Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""
@@ -101,13 +98,20 @@ class BioTacDriver(Driver):
         self._clock = settings.clock
         self._counts: Counter[str] = Counter()
         self._running = False
-        link = settings.open_link()
+        example = "spi://bridge/PORT?speed_hz=4400000"
+        self._link = open_for(settings, "a BioTac", SpiLink, example)  # type: ignore[type-abstract]
+        self._ahead = min(self._options.batches_ahead, self._link.holds)
         try:
-            self._link = _spi(link)
-            self._ahead = min(self._options.batches_ahead, self._link.holds)
+            slowest, fastest = SLOWEST_CLOCK.to("Hz"), FASTEST_CLOCK.to("Hz")
+            if not slowest <= self._link.speed_hz <= fastest:
+                raise RigError(
+                    f"{self._link.address} runs at {self._link.speed_hz} Hz, a BioTac takes {slowest:g} to {fastest:g} "
+                    "Hz.",
+                    hint="Choose speed_hz=4400000, or the next that the adapter has below.",
+                )
             self._set_up()
-        except BaseException:
-            link.close()
+        except RigError:
+            self._link.close()
             raise
 
     def _set_up(self) -> None:
@@ -145,9 +149,7 @@ class BioTacDriver(Driver):
         Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
         the batch before) and ``frames not asked for`` (that would have had their time in between).
         """
-        now = Counter(counted(self._batches.faults))
-        now.update({f"resent {name}": n for name, n in self._batches.resent.items()})
-        return dict(self._counts + now)
+        return dict(self._counts + self._batches.counts)
 
     def identify(self) -> Mapping[str, str]:
         """Return serial number, flex version and software version as the maker's tools show them.
@@ -219,7 +221,7 @@ class BioTacDriver(Driver):
 
     def _give_up_lost(self) -> None:
         """Drop what is under way if nothing has come for longer than all of it can take."""
-        due_ns = self._ahead * self._batches.timing(0).end_ns + round(PATIENCE_S * 1e9)
+        due_ns = self._ahead * self._batches.timing(0)[1] + round(PATIENCE_S * 1e9)
         if self._clock() - self._received_ns > due_ns:
             self._link.abandon()
             self._counts["batches lost"] += len(self._sent)
@@ -256,10 +258,10 @@ class BioTacDriver(Driver):
             word_us = 1e6 / COMMAND_RATE.to("Hz")
             late_us = begun_us - last_us - (first - last_first) * word_us
             if late_us > word_us:
-                frames = round(late_us / (self._batches.frame_words * word_us))
+                frames = round(late_us / (len(self._batches.frame) * word_us))
                 self._counts["batches late"] += 1
                 self._counts["frames not asked for"] += frames
-                self._skipped += frames * self._batches.frame_words
+                self._skipped += frames * len(self._batches.frame)
         self._last = (first, begun_us)
         return begun_us
 
@@ -277,24 +279,3 @@ class BioTacDriver(Driver):
         """Stop and close the link."""
         self.stop()
         self._link.close()
-
-
-def _spi(link: Link) -> SpiLink:
-    """Return the link if a BioTac can be read through it."""
-    if not isinstance(link, SpiLink):
-        raise RigError(
-            f"{link.address} was given, a {type(link).__name__}; a BioTac needs an SPI link.",
-            hint="Give spi://bridge/PORT?speed_hz=4400000 or spi://spidev/0.0?speed_hz=4400000.",
-        )
-    slowest, fastest = SLOWEST_CLOCK.to("Hz"), FASTEST_CLOCK.to("Hz")
-    if not slowest <= link.speed_hz <= fastest:
-        raise RigError(
-            f"{link.address} runs at {link.speed_hz} Hz, a BioTac takes {slowest:g} to {fastest:g} Hz.",
-            hint="Choose speed_hz=4400000, or the next that the adapter has below.",
-        )
-    return link
-
-
-def build(settings: DriverSettings) -> Driver:
-    """Open the link and return the driver, as ``SensorDescriptor.driver`` promises; raises as :class:`BioTacDriver`."""
-    return BioTacDriver(settings)

@@ -7,9 +7,9 @@ was clocked out. Nothing is interpolated: a sample that did not come is marked m
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -53,11 +53,6 @@ def quality_of(reply: Reply) -> Quality:
     if reply.fault is not None:
         return Quality.SUSPECT
     return Quality.SATURATED if reply.value in (0, int(CONVERTER_TOP)) else Quality.GOOD
-
-
-def counted(faults: Mapping[str, Counter[Fault]]) -> dict[str, int]:
-    """Return counts by fault and channel, such as ``parity E7``."""
-    return {f"{fault} {name}": n for name, counts in faults.items() for fault, n in counts.items()}
 
 
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
@@ -211,28 +206,19 @@ def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
     return None if None in times else np.array(times, dtype=np.int64)
 
 
-class Timing(NamedTuple):
-    """When the words of a batch are sampled and when the batch is over, nanoseconds from its beginning."""
-
-    sampled_ns: tuple[int, ...]
-    """A word is sampled at the last bit of its command [assumed]."""
-    end_ns: int
-
-
-class FrameBatches:
-    """Batches of SPI steps for one sensor, and samples from their replies.
+class FrameBatches(FrameRows):
+    """Batches of SPI steps for one sensor, and rows from their replies.
 
     A word is a sampling command, the pause, two bytes read, and a pause that fills its time. SPI adapters take whole
     microseconds, so the pauses differ by one: the time of n words is n / 4400 s to 1 us, whatever the SPI clock.
 
     A resend repeats the last two bytes, so it must come before the next command; and what a batch does cannot depend on
-    what it reads. So a resend is no repair on demand: with `resends` above 0 *every* word is asked for so many times
-    more, and the first that came good is taken. By default there is none: a word of bad parity is SUSPECT and counted.
-    It would double the bytes and the batch's size for words that are hardly ever bad, and no source states which pause
-    a resend needs; 50 us as after a sampling command is assumed, and there is time for one at 4400 words a second.
+    what it reads. So with `resends` above 0 *every* word is requested so many times more, and the first that came good
+    is taken. By default there is none: a word of bad parity is SUSPECT and counted. No source states which pause a
+    resend needs; 50 us as after a sampling command is assumed, and there is time for one at 4400 words a second.
 
     The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
-    repeats the word before it cannot be told by its bytes.
+    repeats the word before it cannot be recognised by its bytes.
 
     Parameters
     ----------
@@ -243,17 +229,15 @@ class FrameBatches:
     select
         Mask of the sensor's select lines.
     resends
-        How often each word is asked for again.
+        How often each word is requested again.
     words
         Words in a batch; None: a frame of them.
 
     Attributes
     ----------
-    faults
-        For each channel, how often which :class:`~tactbench.sensors.biotac.codec.Fault` was seen in the first reply to
-        its command.
-    resent
-        For each channel, how many words came good only when asked for again.
+    counts
+        Faults of the first replies to commands by fault and channel, as ``parity E7``, and ``resent E7`` for words that
+        came good in a repetition only.
 
     Raises
     ------
@@ -270,7 +254,7 @@ class FrameBatches:
         resends: int = 0,
         words: int | None = None,
     ) -> None:
-        self._rows = FrameRows(frame)
+        super().__init__(frame)
         self._select = select
         self._commands = 1 + resends
         self._words = len(frame) if words is None else words
@@ -286,25 +270,19 @@ class FrameBatches:
                 f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
                 f"fit into a word's 1/{rate_hz} s"
             )
-        self.faults: dict[str, Counter[Fault]] = {name: Counter() for name in dict.fromkeys(frame)}
-        self.resent: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()
 
     def _paused_us(self, words: int) -> int:
         """Return the sum of pauses in the first `words` words, rounded down."""
         over, under = self._pauses_us
         return words * over // under
 
-    @property
-    def frame_words(self) -> int:
-        """Words in a frame."""
-        return len(self._rows.frame)
-
     def next(self) -> tuple[int, list[SpiStep]]:
         """Return the position of the next batch's first word, counted over all frames, and the batch."""
         first, steps = self._position, []
         self._position += self._words
         for n in range(first, self._position):
-            command = sampling_command(INDEX[self._rows.frame[n % len(self._rows.frame)]])
+            command = sampling_command(INDEX[self.frame[n % len(self.frame)]])
             for k in range(self._commands):
                 steps.append(SpiStep(RESEND if k else command, self._select, self._command_us))
                 steps.append(SpiStep(FILLER, self._select, self._word_us))
@@ -312,14 +290,17 @@ class FrameBatches:
             steps[-1] = SpiStep(FILLER, self._select, rest_us)
         return first, steps
 
-    def timing(self, first: int) -> Timing:
-        """Return the times within the batch whose first word has position `first`."""
+    def timing(self, first: int) -> tuple[list[int], int]:
+        """Return when the words of the batch whose first has position `first` are sampled, and when it is over.
+
+        Nanoseconds from the batch's beginning; a word is sampled at the last bit of its command [assumed].
+        """
         over, under = 16 * 1_000_000_000, self._speed_hz
         begins = [
             1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * self._commands * n * over // under
             for n in range(self._words + 1)
         ]
-        return Timing(tuple(begin + over // under for begin in begins[:-1]), begins[-1])
+        return [begin + over // under for begin in begins[:-1]], begins[-1]
 
     def take(
         self, first: int, data: Sequence[bytes], *, t_ns: int, device_ns: int | None = None, skipped: int = 0
@@ -345,8 +326,8 @@ class FrameBatches:
         stride = 2 * self._commands
         for n, after_ns in enumerate(sampled_ns):
             words = data[stride * n + 1 : stride * (n + 1) : 2]
-            reply = self._reply(self._rows.frame[(first + n) % len(self._rows.frame)], words)
-            self._rows.put(
+            reply = self._reply(self.frame[(first + n) % len(self.frame)], words)
+            self.put(
                 first + n + skipped,
                 reply.value or 0,
                 quality_of(reply),
@@ -361,19 +342,11 @@ class FrameBatches:
         """
         reply = decoded(words[0])
         if reply.fault is not None:
-            self.faults[channel][reply.fault] += 1
+            self.counts[f"{reply.fault} {channel}"] += 1
         if reply.fault in (Fault.PARITY, Fault.RESERVED):
             for word in words[1:]:
                 again = decoded(word)
                 if again.fault is None:
-                    self.resent[channel] += 1
+                    self.counts[f"resent {channel}"] += 1
                     return again
         return reply
-
-    def blocks(self) -> list[Block]:
-        """Return the samples of rows that ended since the last call: raw counts with their quality."""
-        return self._rows.blocks()
-
-    def close(self) -> None:
-        """End the rows that are begun."""
-        self._rows.close()

@@ -6,12 +6,11 @@ It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
-from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState
+from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState, Transducer
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.meshes import sheet_x
@@ -22,10 +21,10 @@ _STEP_MM = 0.1
 """Step over which the film's stretch under a disc is computed: an eighth of the disc or less."""
 
 
-class Preparation:
-    """Geometry and interpolation, which do not depend on the load."""
+class Electrodes:
+    """The electrodes under the film of one skin: geometry and interpolation, which do not depend on the load."""
 
-    def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
+    def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> None:
         self.skin, outer, dome = finger_of(sensor)
         fine = refined(grid, refinement)
         self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
@@ -39,57 +38,28 @@ class Preparation:
         corners = mid_film_mm(corner_x, corner_angle, self.skin.film.at(corner_x, corner_angle), outer, dome)
         self.sheet = FilmSheet(faces_between(corners), discs_on(sensor, fine))
 
-    def film_under(self, state: SkinState) -> FloatArray:
-        """Return the film on the conduction grid: h0 evaluated there exactly, the deflection interpolated."""
+    def resistances(self, state: SkinState) -> FloatArray:
+        """Return (n_electrodes,) resistances times sigma, 1/mm, of electrodes read one at a time.
+
+        The film at rest is evaluated on the conduction grid exactly, the deflection interpolated.
+        """
         deflection = self.to_fine_x @ state.deflection_mm @ self.to_fine_s
-        return np.asarray(np.maximum(self.film - deflection, self.residual_film))
+        return np.diag(self.sheet.resistances(np.maximum(self.film - deflection, self.residual_film)))
 
     def shares(self, state: SkinState) -> FloatArray:
-        """Return (n_electrodes,) the share of the drive across the reference resistor, electrodes read one at a time.
+        """Return (n_electrodes,) the share of the drive across the reference resistor.
 
         ``R_ref / (R_ref + Z_ee)``, the divider of the maker's formula ``Z = (4095 / E - 1) 10 kOhm``. That the others
         carry no current while one is sampled is derived: the commands address one channel, and no public text
         states how it is switched.
         """
-        resistances = np.diag(self.sheet.resistances(self.film_under(state)))
-        return np.asarray(self.reference_per_mm / (self.reference_per_mm + resistances))
-
-
-class BioTacTransducer:
-    """Readings in counts, before noise, rounding and clipping."""
-
-    def __init__(self, prepared: Preparation, sensor: SensorSpec, channel_names: Sequence[str]) -> None:
-        self._prepared = prepared
-        self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(channel_names) if name in NAMES]
-        self._pressures = [place for place, name in enumerate(channel_names) if name == "PDC"]
-        self._n_channels = len(channel_names)
-        channels = {channel.name: channel for channel in sensor.channels()}
-        self._full_scale = channels[NAMES[0]].upper or 0.0
-        pdc = channels["PDC"]
-        if pdc.scale is None or pdc.rest is None:
-            raise RigError("PDC needs a scale and a rest level.", hint="Complete the sensor's channel.")
-        self._pa_per_count, self._pdc_rest = pdc.scale.to("Pa/count"), pdc.rest.value
-
-    def __call__(self, state: SkinState) -> FloatArray:
-        """Return the (n_wanted,) readings under a state of the prepared grid; raises RigError as :class:`FilmSheet`."""
-        readings = np.empty(self._n_channels)
-        if self._electrodes:
-            shares = self._prepared.shares(state)
-            for place, electrode in self._electrodes:
-                readings[place] = self._full_scale * shares[electrode]
-        for place in self._pressures:
-            readings[place] = self._pdc_rest + 1e6 * state.fluid_pressure_mpa / self._pa_per_count
-        return readings
+        return np.asarray(self.reference_per_mm / (self.reference_per_mm + self.resistances(state)))
 
 
 def build(
-    sensor: SensorSpec,
-    grid: SkinGrid,
-    channel_names: Sequence[str],
-    *,
-    refinement: int = REFINEMENT,
-) -> BioTacTransducer:
-    """Prepare the BioTac's transduction.
+    sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str], *, refinement: int = REFINEMENT
+) -> Transducer:
+    """Return the BioTac's transducer: readings in counts, before noise, rounding and clipping.
 
     Parameters
     ----------
@@ -105,7 +75,7 @@ def build(
     Raises
     ------
     RigError
-        For TDC, TAC, PAC and unknown names; for a skin that is no fluid-backed shell.
+        For TDC, TAC, PAC and unknown names; for a skin that is no fluid-backed shell; if PDC states no scale or rest.
     """
     for name in channel_names:
         if name not in NAMES and name != "PDC":
@@ -113,20 +83,23 @@ def build(
                 f"{name} of {sensor.name} is not read from the skin.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
-    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(channel_names))
+    electrodes = Electrodes(sensor, grid, refinement)
+    places = [(place, NAMES.index(name)) for place, name in enumerate(channel_names) if name in NAMES]
+    channels = {channel.name: channel for channel in sensor.channels()}
+    pdc, full_scale = channels["PDC"], channels[NAMES[0]].upper or 0.0
+    if pdc.scale is None or pdc.rest is None:
+        raise RigError("PDC needs a scale and a rest level.", hint="Complete the sensor's channel.")
+    pa_per_count, pdc_rest = pdc.scale.to("Pa/count"), pdc.rest.value
 
+    def read(state: SkinState) -> FloatArray:
+        readings = np.full(len(channel_names), pdc_rest + 1e6 * state.fluid_pressure_mpa / pa_per_count)
+        if places:
+            shares = electrodes.shares(state)
+            for place, electrode in places:
+                readings[place] = full_scale * shares[electrode]
+        return readings
 
-def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:
-    """Return the preparation for `sensor` and `grid`, made once and kept."""
-    return _prepared(sensor.model_dump_json(), grid.x_mm.tobytes(), grid.s_mm.tobytes(), refinement)
-
-
-@lru_cache(maxsize=8)
-def _prepared(sensor: str, x_mm: bytes, s_mm: bytes, refinement: int) -> Preparation:
-    """Return the preparation by hashable copies of spec and grid."""
-    return Preparation(
-        SensorSpec.model_validate_json(sensor), SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), refinement
-    )
+    return read
 
 
 def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:

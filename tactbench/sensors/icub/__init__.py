@@ -15,7 +15,7 @@ def tactbench_sensors() -> list[SensorDescriptor]:
         SensorDescriptor(
             spec=SPEC,
             transducer="tactbench.sensors.icub.transduction:build",
-            driver="tactbench.sensors.icub.driver:build",
+            driver="tactbench.sensors.icub.driver:FingertipDriver",
             emulator="tactbench.sensors.icub.emulator:build_emulator",
             emulated_link="can",
             log_reader="tactbench.sensors.icub.log:read_log",

@@ -8,6 +8,7 @@ A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -255,61 +256,17 @@ class Sample:
 
     board: int
     triangle: int
-    sequence: int
-    """Samples of this triangle before it, counted by the decoder: the boards send no counter and no time."""
     t_ns: int
     """Host time of its first frame, nanoseconds."""
     taxels: bytes
     """(12,) counts, as the sensor's spec has them: 0 to 255, falling under pressure; 0 where missing."""
     quality: tuple[Quality, ...]
     """(12,)"""
-    word: int | None
-    """Error word; None if the tail is missing, or that of old firmware, which has none."""
-
-
-@dataclass
-class Counts:
-    """What was found in the frames of one triangle."""
-
-    samples: int = 0
-    missing_heads: int = 0
-    missing_tails: int = 0
-    far_apart: int = 0
-    """Samples whose halves are half a period apart or more."""
-    doubled: int = 0
-    """Frames kept out because they came twice."""
-    malformed: int = 0
-    """Frames kept out for their length."""
-    without_word: int = 0
-    """Samples whose tail had no error word."""
-    not_connected: int = 0
-    no_ack: int = 0
-    out_of_range: list[int] = field(default_factory=lambda: [0] * TAXELS)
-    """(12,) samples in which the error word called the taxel out of range."""
-    long_intervals: int = 0
-    """Samples more than 1.5 periods after the one before: both frames lost, or a late host; only a fit of the clocks
-    can tell."""
-
-    def named(self) -> dict[str, int]:
-        """Return what was wrong, by the names that a recording has, without what never was."""
-        found = {
-            "heads missing": self.missing_heads,
-            "tails missing": self.missing_tails,
-            "halves far apart": self.far_apart,
-            "frames doubled": self.doubled,
-            "frames of wrong length": self.malformed,
-            "samples without error word": self.without_word,
-            "samples not connected": self.not_connected,
-            "samples not acknowledged": self.no_ack,
-            "long intervals": self.long_intervals,
-        }
-        found |= {f"T{number} out of range": samples for number, samples in enumerate(self.out_of_range, 1)}
-        return {name: number for name, number in found.items() if number}
 
 
 @dataclass
 class _Triangle:
-    counts: Counts = field(default_factory=Counts)
+    counts: Counter[str] = field(default_factory=Counter)
     head: CanFrame | None = None
     """Waits for its tail."""
     tail: CanFrame | None = None
@@ -344,7 +301,8 @@ class SkinDecoder:
     Attributes
     ----------
     counts
-        (board, triangle) -> :class:`Counts`.
+        (board, triangle) -> what was wrong so far, by the names that a recording has. A long interval between samples
+        is one of more than 1.5 periods: both frames lost, or a late host; only a fit of the clocks can tell.
     foreign
         Frames that were no skin data.
 
@@ -363,7 +321,7 @@ class SkinDecoder:
         self._triangles: dict[tuple[int, int], _Triangle] = {}
 
     @property
-    def counts(self) -> dict[tuple[int, int], Counts]:
+    def counts(self) -> dict[tuple[int, int], Counter[str]]:
         """(board, triangle) -> what was found so far."""
         return {key: triangle.counts for key, triangle in self._triangles.items()}
 
@@ -378,12 +336,12 @@ class SkinDecoder:
         triangle = self._triangles.setdefault(key, _Triangle())
         # Old firmware's tail ends with taxel 11.
         if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
-            triangle.counts.malformed += 1
+            triangle.counts["frames of wrong length"] += 1
             return []
         head = triangle.head
         if data[0] == HEAD:
             if head is not None and self._near(head, frame) and head.data == data:
-                triangle.counts.doubled += 1
+                triangle.counts["frames doubled"] += 1
                 triangle.doubled += tuple(range(IN_HEAD))
                 return []
             triangle.head = frame
@@ -391,7 +349,7 @@ class SkinDecoder:
         last, triangle.head, triangle.tail = triangle.tail, None, frame
         if head is None:
             if last is not None and self._near(last, frame) and last.data == data:
-                triangle.counts.doubled += 1
+                triangle.counts["frames doubled"] += 1
                 triangle.doubled += tuple(range(IN_HEAD, TAXELS))
                 return []
             return [self._sample(key, triangle, None, frame)]
@@ -419,7 +377,7 @@ class SkinDecoder:
         first = head or tail
         assert first is not None
         if triangle.last_ns is not None and first.t_ns - triangle.last_ns > 1.5 * self._period_ns:
-            counts.long_intervals += 1
+            counts["long intervals"] += 1
         triangle.last_ns = first.t_ns
         taxels = (head.data[1:] if head else bytes(IN_HEAD)) + (tail.data[1:6] if tail else bytes(TAXELS - IN_HEAD))
         word = int.from_bytes(tail.data[6:]) if tail and len(tail.data) == 8 else None
@@ -428,9 +386,8 @@ class SkinDecoder:
             marks[taxel] |= Quality.SUSPECT
         for taxel in out_of_range(word or 0):
             marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
-            counts.out_of_range[taxel] += 1
+            counts[f"T{taxel + 1} out of range"] += 1
         far_apart = head is not None and tail is not None and not self._near(head, tail)
-        counts.far_apart += far_apart
         if far_apart or tail is None or (word or 0) & (NO_ACK | RESERVED):
             marks = [mark | Quality.SUSPECT for mark in marks]
         if head is None:
@@ -439,14 +396,17 @@ class SkinDecoder:
             marks[IN_HEAD:] = [Quality.MISSING] * (TAXELS - IN_HEAD)
         if (word or 0) & NOT_CONNECTED:
             marks = [Quality.MISSING] * TAXELS
-        counts.missing_heads += head is None
-        counts.missing_tails += tail is None
-        counts.without_word += tail is not None and word is None
-        counts.no_ack += bool((word or 0) & NO_ACK)
-        counts.not_connected += bool((word or 0) & NOT_CONNECTED)
-        counts.samples += 1
+        wrong = {
+            "heads missing": head is None,
+            "tails missing": tail is None,
+            "halves far apart": far_apart,
+            "samples without error word": tail is not None and word is None,
+            "samples not acknowledged": (word or 0) & NO_ACK,
+            "samples not connected": (word or 0) & NOT_CONNECTED,
+        }
+        counts.update(name for name, found in wrong.items() if found)
         triangle.doubled = ()
-        return Sample(*key, counts.samples - 1, first.t_ns, taxels, tuple(marks), word)
+        return Sample(*key, first.t_ns, taxels, tuple(marks))
 
 
 def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:

@@ -84,7 +84,7 @@ class FingertipDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """See :meth:`~tactbench.sensors.icub.codec.Counts.named`; beside them what was not ours, or no data frame."""
+        """Faults as the decoder counts them; beside them frames of others and frames that are no skin data."""
         return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
 
     def identify(self) -> Mapping[str, str]:
@@ -181,7 +181,7 @@ class FingertipDriver(Driver):
         """Return what the decoder has counted; it is given frames of one triangle only."""
         found = Counter({"frames that are no skin data": self._decoder.foreign})
         for counts in self._decoder.counts.values():
-            found.update(counts.named())
+            found.update(counts)
         return found
 
     def _send(self, command: Command) -> None:
@@ -197,8 +197,3 @@ class FingertipDriver(Driver):
             return self._decoder.feed(frame)
         self._others += (frame.id, frame.data) not in self._sent
         return []
-
-
-def build(settings: DriverSettings) -> FingertipDriver:
-    """Open the link to the fingertip; raises as :class:`FingertipDriver`."""
-    return FingertipDriver(settings)

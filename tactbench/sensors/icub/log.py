@@ -72,7 +72,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             kept.append(sample)
     sent = [command for to, command in commands if to in (board, BROADCAST)]
     counts = {
-        **decoder.counts[board, triangle].named(),
+        **decoder.counts[board, triangle],
         "frames of others": len(frames) - len(half) - len(commands),
         **left_out,
         "samples kept out, not after the one before": len(samples) - len(kept),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from tactbench.plugin import ChannelSpec, FloatArray, RigError, SensorSpec
-from tactbench.plugin.simulation import FoamPad, SkinGrid, SkinState
+from tactbench.plugin.simulation import FoamPad, SkinGrid, SkinState, Transducer
 
 SUBSAMPLES = 4
 """Points per cell and axis that average a taxel's weight."""
@@ -55,28 +54,10 @@ def taxel_weight(grid: SkinGrid, centre_mm: tuple[float, float], radius_mm: floa
     return np.asarray(cells / total)
 
 
-class ICubTransducer:
-    """Readings in counts: ``rest - gain (C/C0 - 1)``, before noise, rounding and clipping."""
+def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
+    """Return the fingertip's transducer: ``rest - gain (C/C0 - 1)`` in counts, before noise, rounding and clipping.
 
-    def __init__(self, weights: FloatArray, rest: FloatArray, gain: float, foam_mm: float, least_gap: float) -> None:
-        self._weights = weights
-        self._rest = rest
-        self._gain = gain
-        self._foam_mm = foam_mm
-        self._least_mm = least_gap * foam_mm
-
-    def capacitance(self, state: SkinState) -> FloatArray:
-        """Return (n_wanted,) C/C0, ``sum W_i h / (h - u)`` with the plates never nearer than `least_gap` of h."""
-        closeness = self._foam_mm / np.maximum(state.thickness_mm, self._least_mm)
-        return np.asarray(self._weights @ closeness.ravel())
-
-    def __call__(self, state: SkinState) -> FloatArray:
-        """Return the (n_wanted,) readings under a state of the grid given to `build`."""
-        return np.asarray(self._rest - self._gain * (self.capacitance(state) - 1.0))
-
-
-def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> ICubTransducer:
-    """Prepare the iCub fingertip's transduction.
+    C/C0 is ``sum W_i h / (h - u)`` over a taxel's cells, with the plates never nearer than `least_gap` of h.
 
     Parameters
     ----------
@@ -104,21 +85,16 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> I
         raise RigError(f"{sensor.name} has no taxel {', '.join(unknown)}.", hint=f"Taxels: {', '.join(taxels)}.")
     radius = sensor.parameters["taxel_radius"].to("mm")
     outer = skin.sheet.outer_radius.to("mm")
-    cells = grid.x_mm.tobytes(), grid.s_mm.tobytes()
-    weights = [_kept(*cells, _place_mm(taxels[name], outer), radius) for name in channel_names]
-    return ICubTransducer(
-        np.stack(weights) if weights else np.empty((0, len(grid.x_mm) * len(grid.s_mm))),
-        np.array([_rest(taxels[name]) for name in channel_names]),
-        sensor.parameters["gain"].to("count"),
-        skin.thickness.to("mm"),
-        sensor.parameters["least_gap"].value,
-    )
+    weights = np.array([taxel_weight(grid, _place_mm(taxels[name], outer), radius).ravel() for name in channel_names])
+    rest = np.array([_rest(taxels[name]) for name in channel_names])
+    gain, foam_mm = sensor.parameters["gain"].to("count"), skin.thickness.to("mm")
+    least_mm = sensor.parameters["least_gap"].value * foam_mm
 
+    def read(state: SkinState) -> FloatArray:
+        closeness = foam_mm / np.maximum(state.thickness_mm, least_mm)
+        return np.asarray(rest - gain * (weights @ closeness.ravel() - 1.0))
 
-@lru_cache(maxsize=64)
-def _kept(x_mm: bytes, s_mm: bytes, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
-    """Return the flat weight of a taxel, made once for all recordings of a process."""
-    return taxel_weight(SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), centre_mm, radius_mm).ravel()
+    return read
 
 
 def _place_mm(taxel: ChannelSpec, outer_radius_mm: float) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
-from tactbench.plugin.simulation import SkinGrid, SkinState
+from tactbench.plugin.simulation import SkinGrid, SkinState, Transducer
 
 
 def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -> FloatArray:
@@ -19,22 +19,8 @@ def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -
     return np.asarray(sigma_mm * math.sqrt(math.pi / 2) * np.diff(primitive))
 
 
-class IdealTransducer:
-    """Readings in counts, exact for a pressure that is constant in each cell."""
-
-    def __init__(self, along_x: FloatArray, along_s: FloatArray, sensitivity: float) -> None:
-        self._along_x, self._along_s = along_x, along_s
-        self._sensitivity = sensitivity
-
-    def __call__(self, state: SkinState) -> FloatArray:
-        """Return the (n_wanted,) readings under a state of the grid given to `build`."""
-        # MPa times mm^2 is newton.
-        felt = np.einsum("ix,xs,is->i", self._along_x, state.pressure_mpa, self._along_s, optimize=True)
-        return np.asarray(self._sensitivity * felt)
-
-
-def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> IdealTransducer:
-    """Prepare the ideal grid's transduction.
+def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
+    """Return the ideal grid's transducer: readings in counts, exact for a pressure that is constant in each cell.
 
     Parameters
     ----------
@@ -59,4 +45,11 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> I
             raise RigError(f"{sensor.name} has no taxel {name} with a place.", hint=f"Taxels: {', '.join(places)}.")
         along_x[row] = gaussian_over_cells(grid.x_mm, 1e3 * place[0], sigma)
         along_s[row] = gaussian_over_cells(grid.s_mm, 1e3 * place[1], sigma)
-    return IdealTransducer(along_x, along_s, sensor.parameters["sensitivity"].to("count/N"))
+    sensitivity = sensor.parameters["sensitivity"].to("count/N")
+
+    def read(state: SkinState) -> FloatArray:
+        # MPa times mm^2 is newton.
+        felt = np.einsum("ix,xs,is->i", along_x, state.pressure_mpa, along_s, optimize=True)
+        return np.asarray(sensitivity * felt)
+
+    return read

@@ -107,7 +107,7 @@ def any_radius(case):
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
     reaches(press, skin, loads[-1])
-    told = remarks(press, loads, skin.sheet)
+    told = remarks(press, loads[-1], skin.sheet)
     few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
         ("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it"
@@ -143,7 +143,7 @@ def unresolved_contact(case):
     load = case.decades(1e-3, 3.0)
     coarse, fine = press_of(skin, contact), press_of(skin, contact, (96, 96))
     depth = lawful(case, coarse, [load])[0].depth_mm
-    if "remark contact" in remarks(coarse, [load], skin.sheet):
+    if "remark contact" in remarks(coarse, load, skin.sheet):
         return
     wanted = fine(load).depth_mm
     case.holds(abs(depth / wanted - 1) <= 0.05, f"depth {depth:g} mm against {wanted:g} mm, and no remark")
@@ -178,7 +178,7 @@ def any_load(case):
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
     reaches(press, skin, loads[-1])
-    case.holds("remark load" in remarks(press, loads, skin.sheet), "500 N and no remark")
+    case.holds("remark load" in remarks(press, loads[-1], skin.sheet), "500 N and no remark")
 
 
 def loads_that_are_none(case):

@@ -6,8 +6,8 @@ import numpy as np
 
 from tactbench.plugin import ForceRamp, Indenter, Scene, SensorDescriptor
 from tactbench.rigs.twin.fidelity import DEFAULT, FINE, Fidelity
-from tactbench.rigs.twin.rig import Twin
-from tests.rigs.twin.conftest import EFFECTS, q
+from tactbench.rigs.twin.preparation import carried_out
+from tests.rigs.twin.conftest import TWIN, q
 
 SCENE = Scene(name="cap", indenter=Indenter(radius=q(10.0)), profile=ForceRamp(samples=50))
 
@@ -34,12 +34,10 @@ def plain_factory(sensor, grid, wanted):
 
 
 def _deepest(sensor: SensorDescriptor, fidelity: Fidelity) -> float:
-    rig = Twin(EFFECTS, fidelity)
-    with rig.open(sensor, SCENE, seed=3) as acquisition:
-        return float(acquisition.drawn["depth_mm"])
+    return float(carried_out(sensor, SCENE, 3, TWIN.plan(sensor, SCENE), fidelity).drawn["depth_mm"])
 
 
-def test_a_rig_resolves_as_finely_as_it_is_told_and_keeps_tables_apart(specs):
+def test_a_contact_is_resolved_as_finely_as_asked_and_tables_are_kept_apart(specs):
     sensor = SensorDescriptor(spec=specs["icub"], transducer=f"{__name__}:plain_factory")
     GRIDS.clear()
     coarse = dataclasses.replace(DEFAULT, cells_factor=0.5)

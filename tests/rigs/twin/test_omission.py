@@ -7,9 +7,7 @@ import pytest
 
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, Placement, Scene, load_registry
-from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.effects.called_for import widest_contact_mm
-from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.verify import omitted
 from tests.rigs.twin.conftest import TWIN, named, q, unrounded
 
@@ -98,18 +96,3 @@ def test_a_ramp_of_a_minute_does_not(sensors):
     assert bound == float("inf")
     assert largest > 10 * hidden
     assert largest <= entry.change
-
-
-@pytest.mark.parametrize(
-    "drawn", [*(case for name, case in OFF_THE_NOMINAL_PLACE if name == "biotac"), {"radius": None}]
-)
-def test_no_contact_is_wider_than_the_bound_of_heat_takes_it_to_be(sensors, drawn):
-    sensor = sensors["biotac"]
-    tilt = q(drawn.get("tilt", 0.0), "deg")
-    placement = Placement(x=q(drawn.get("x", 0.0), "mm"), s=q(drawn.get("s", 0.0), "mm"), tilt_x=tilt)
-    scene = _slow(drawn["radius"], drawn.get("end", 12.0), placement=placement)
-    widest = widest_contact_mm(scene, sensor.spec.skin.sheet)
-    table = skin_under_load(prepare(sensor, scene, 1, TWIN.plan(sensor, scene)))
-    radii = table.skin(np.linspace(0.0, table.loads_n[-1], 200)).contact_radius_mm
-    # Not by more than the few times that a contact at the very rim, or across the whole sheet, would take.
-    assert widest / 10 < radii.max() <= widest

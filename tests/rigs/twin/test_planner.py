@@ -29,14 +29,6 @@ def test_every_effect_has_one_entry_with_a_reason(specs):
         assert all(entry.reason for entry in plan.entries)
 
 
-def test_producers_come_before_consumers_whatever_the_order_given(specs):
-    for effects in (EFFECTS, EFFECTS[::-1]):
-        names = [effect.name for effect in plan_scene(effects, Scene(name="s"), specs["biotac"]).stages]
-        assert names.index("contact") < names.index("creep") < names.index("transduction") < names.index("converter")
-        assert names.index("gain") < names.index("transduction")
-        assert names.index("white-noise") < names.index("converter")
-
-
 def test_what_changes_nothing_is_left_out(specs):
     held = ForceRamp(start=q(2, "N"), end=q(2, "N"))
     plan = _named(plan_scene(EFFECTS, Scene(name="held", profile=held), specs["icub"]))

@@ -67,14 +67,6 @@ def test_a_recording_has_the_shape_it_promises(sensors):
     assert acquisition.drawn["table_error_count"] < 1.0
 
 
-@pytest.mark.parametrize("name", ["icub", "biotac"])
-def test_the_same_seed_gives_the_same_bits_and_another_does_not(sensors, name):
-    first, second, other = (_record(sensors[name], _scene(), seed=seed)[1] for seed in (4, 4, 5))
-    for stream, (_, data, _quality) in first.items():
-        np.testing.assert_array_equal(data, second[stream][1])
-        assert not np.array_equal(data, other[stream][1])
-
-
 def test_the_place_of_contact_is_stated_with_the_commanded_offset(sensors):
     moved = Placement(x=q(1.5), s=q(-0.5), scatter=q(0.2))
     acquisition, _ = _record(sensors["biotac"], _scene(placement=moved, profile=ForceRamp(samples=20)))

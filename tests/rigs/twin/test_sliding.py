@@ -158,16 +158,6 @@ def test_a_surface_of_an_earlier_recording_is_read_by_its_wavelength():
     assert Surface.model_validate(given).roll_off == q(6.25)
 
 
-def test_louder_with_roughness(record):
-    def loud(um):
-        slide = _slide(50.0, surface=Surface(roughness=q(um, "um")))
-        _, streams = record(profile=_held(seconds=4.0), environment=SILENT, slide=slide)
-        return streams["vibration"].data[4400:, 0].astype(float).std()
-
-    # Linear, up to rounding to a count.
-    assert loud(40.0) / loud(20.0) == pytest.approx(2.0, rel=0.02)
-
-
 def test_a_profile_that_passes_is_read_like_a_force_that_changes(record):
     rough = Surface(roughness=q(200.0, "um"))
 

@@ -20,7 +20,7 @@ from tactbench.plugin.devices import (
     open_link,
 )
 from tactbench.sensors.biotac.codec import CHANNELS
-from tactbench.sensors.biotac.driver import build
+from tactbench.sensors.biotac.driver import BioTacDriver
 from tactbench.sensors.biotac.emulator import Emulator, build_emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.spec import SPEC
@@ -120,7 +120,7 @@ def virtual(sensed, *faults, options=None, **adapter):
     """A driver in virtual time, its link and its clock."""
     clock = Clock()
     link = Adapter(emulator(sensed, *faults, **(options or {})).exchange, clock, **adapter)
-    with build(DriverSettings(lambda: link, SPEC.streams, options or {}, clock)) as driver:
+    with BioTacDriver(DriverSettings(lambda: link, SPEC.streams, options or {}, clock)) as driver:
         yield driver, link, clock
 
 
@@ -266,7 +266,7 @@ def test_no_sensor_is_said():
 
 def test_another_sensor_is_no_biotac():
     link = Adapter(Emulator(properties={"serial number": b"NT2P0220B11E0004"}).exchange, Clock())
-    with build(DriverSettings(lambda: link)) as driver, pytest.raises(RigError, match="begins with BT"):
+    with BioTacDriver(DriverSettings(lambda: link)) as driver, pytest.raises(RigError, match="begins with BT"):
         driver.identify()
 
 
@@ -313,7 +313,7 @@ def test_an_unplugged_link_ends_the_reading_and_closes():
 
 def test_options_that_are_none_are_refused_before_the_link_is_opened():
     with pytest.raises(UsageError, match="names of channels"):
-        build(DriverSettings(lambda: pytest.fail("opened"), options={"frame": "E1 E20"}))
+        BioTacDriver(DriverSettings(lambda: pytest.fail("opened"), options={"frame": "E1 E20"}))
 
 
 @pytest.mark.parametrize(
@@ -323,7 +323,7 @@ def test_options_that_are_none_are_refused_before_the_link_is_opened():
 def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed(speed_hz, options, said):
     link = Adapter(emulator(Sensed()).exchange, Clock(), speed_hz=speed_hz)
     with pytest.raises(RigError, match=said):
-        build(DriverSettings(lambda: link, options=options))
+        BioTacDriver(DriverSettings(lambda: link, options=options))
     with pytest.raises(LinkError, match="closed"):
         link.receive(0.0)
 
@@ -337,7 +337,7 @@ def test_a_second_at_full_rate_through_the_bridge():
     sensed = Sensed()
     with (
         serving(BridgeEmulator(emulator(sensed).exchange, holds=16)) as far,
-        build(DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams,
+        BioTacDriver(DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams,
                              {"batches_ahead": 16})) as driver,
     ):  # fmt: skip
         assert driver.identify() == {**SERIAL, "adapter": "tactbench emulator"}

@@ -5,7 +5,7 @@ import pytest
 
 from tactbench.plugin import DataError, Quality, UsageError
 from tactbench.sensors.biotac.codec import INDEX, encoded, parity_holds
-from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches, counted
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches
 from tactbench.sensors.biotac.spec import SPEC
 from tactbench.sensors.biotac.text_log import read_log
 
@@ -57,7 +57,7 @@ def test_a_log_gives_what_the_wire_gave(log_of, frame, sensor):
         assert ours.t_ns is None
         # The log counts frames from 1.
         assert np.array_equal(ours.sequence, wire.sequence + len(wire.sequence) // 6)
-    assert log.counts == counted(batches.faults)
+    assert log.counts == batches.counts
 
 
 def test_header_times_and_rates(log_of):

@@ -7,7 +7,7 @@ import numpy as np
 from tactbench.plugin import Block
 from tactbench.plugin.devices import CanFrame, CanLink, DriverSettings, EmulatorSettings
 from tactbench.sensors.icub.channels import STREAMS
-from tactbench.sensors.icub.driver import build
+from tactbench.sensors.icub.driver import FingertipDriver
 from tactbench.sensors.icub.emulator import build_emulator
 
 NAMES = [channel.name for channel in STREAMS[0].channels]
@@ -68,7 +68,7 @@ class VirtualLink(CanLink):
 
 def in_virtual_time(senses=rising, faults=(), **options):
     link = VirtualLink(emulator(senses, faults, **options))
-    return build(DriverSettings(lambda: link, STREAMS, options, link.now_ns)), link
+    return FingertipDriver(DriverSettings(lambda: link, STREAMS, options, link.now_ns)), link
 
 
 def joined(blocks):

@@ -25,7 +25,7 @@ from tactbench.sensors.icub.codec import (
     read_command,
     skin_frames,
 )
-from tactbench.sensors.icub.driver import SETTLE_S, build
+from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver
 from tactbench.sensors.icub.emulator import BoardFault, Bus
 from tests.sensors.icub.emulated import (
     NAMES,
@@ -262,7 +262,7 @@ def test_its_own_frames_may_come_back():
             self.put(frame)
 
     link = Echoing(emulator())
-    with build(DriverSettings(lambda: link, STREAMS, {}, link.now_ns)) as driver:
+    with FingertipDriver(DriverSettings(lambda: link, STREAMS, {}, link.now_ns)) as driver:
         assert driver.identify()["model"] == "MTB4"
         driver.start()
         assert read_until(driver, link, 0.55).data.tolist() == [sensed(0.52), sensed(0.54)]
@@ -278,7 +278,7 @@ def test_its_own_frames_may_come_back():
 )
 def test_options_that_cannot_be_are_refused_before_the_link_is_opened(options, said):
     with pytest.raises(UsageError, match=said):
-        build(DriverSettings(lambda: pytest.fail("opened"), STREAMS, options))
+        FingertipDriver(DriverSettings(lambda: pytest.fail("opened"), STREAMS, options))
     with pytest.raises(UsageError, match=said):
         emulator(**options)
 

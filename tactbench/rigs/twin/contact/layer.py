@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium, no_local_law
+from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 _SERIES_BELOW = 0.35
@@ -77,10 +77,16 @@ def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
         grid=grid,
         spectrum=spectrum,
         stiffness=stiffness,
-        respond=no_local_law,
+        respond=_no_local_law,
         contact_stiffness=skin.contact_stiffness.to("MPa/mm"),
         zero_mean=incompressible,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,
         low_modes=80,
     )
+
+
+def _no_local_law(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+    """Return no pressure: the law of a medium whose whole stiffness is in the Fourier modes."""
+    tangent.fill(0.0)
+    return np.zeros_like(deflection_mm), 0.0

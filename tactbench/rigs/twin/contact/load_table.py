@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -19,7 +18,7 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import AnyPress, scalars, whole_skin
+from tactbench.rigs.twin.contact.press import AnyPress, whole_skin
 
 _SCOUTS = 4
 _SCOUTS_POWER = 1.7
@@ -58,8 +57,10 @@ class LoadTable:
     """(n,) nodes, the first at zero."""
     readings: FloatArray
     """(n, channels)"""
-    states: tuple[SkinState, ...]
-    """(n,) the skin at the nodes, without its fields."""
+    depth_mm: float
+    """Depth under the largest load."""
+    residual: float
+    """Largest residual of all nodes."""
     touch_down_n: tuple[float, float] | None
     """Bracket of the load at which the skin touches the core; None if it never does."""
     error: FloatArray
@@ -67,14 +68,6 @@ class LoadTable:
     interpolant: Interpolant
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
-    solves: int
-    read_s: float
-    """Seconds spent on reading the skin; solving it is not among them."""
-
-    @property
-    def residual(self) -> float:
-        """Largest residual of all nodes."""
-        return max(state.residual for state in self.states)
 
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
@@ -104,20 +97,19 @@ class LoadTable:
 
 
 class _Builder:
-    def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
+    def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray]) -> None:
         self._press = press
-        self._clock = clock
-        self.read_s = 0.0
         self._read = read
-        self.nodes: dict[float, tuple[SkinState, FloatArray]] = {}
+        self.nodes: dict[float, tuple[FloatArray, FloatArray]] = {}
+        """Load -> scalars of the skin, and readings."""
+        self.residual = 0.0
         self.closed: dict[float, bool] = {}
 
     def node(self, force: float) -> FloatArray:
         if force not in self.nodes:
             state = self._press(force)
-            began = self._clock()
-            self.nodes[force] = (scalars(state), self._read(state))
-            self.read_s += self._clock() - began
+            self.nodes[force] = (whole_skin(state), self._read(state))
+            self.residual = max(self.residual, state.residual)
             self.closed[force] = force > 0 and self._press.closing_at(force) > 0
         return self.nodes[force][1]
 
@@ -127,7 +119,7 @@ class _Builder:
 
     def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
         loads = sorted(self.nodes)
-        return through(loads, [whole_skin(self.nodes[load][0]) for load in loads], touch_down)
+        return through(loads, [self.nodes[load][0] for load in loads], touch_down)
 
 
 def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
@@ -145,7 +137,6 @@ def build_table(
     largest_n: float,
     tolerance: FloatArray,
     most_nodes: int = 14,
-    clock: Callable[[], float] = time.perf_counter,
 ) -> LoadTable:
     """Solve and tabulate one contact.
 
@@ -161,16 +152,13 @@ def build_table(
         (channels,) wanted bound on the interpolation error.
     most_nodes
         Nodes after which refining ends even if the bound is missed: the achieved one is reported.
-    clock
-        Seconds, monotonic.
     """
-    builder = _Builder(press, read, clock)
+    builder = _Builder(press, read)
     if not largest_n > 0:
         rest = builder.node(0.0)
         flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
         still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
-        state = builder.nodes[0.0][0]
-        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0, 0.0)
+        return LoadTable(np.zeros(1), rest[None, :], 0.0, 0.0, None, np.zeros(rest.size), flat, still)
     builder.node(0.0)
     for j in range(1, _SCOUTS + 1):
         builder.node(largest_n * (j / _SCOUTS) ** _SCOUTS_POWER)
@@ -181,13 +169,12 @@ def build_table(
     return LoadTable(
         loads_n=np.array(loads),
         readings=np.stack([builder.nodes[load][1] for load in loads]),
-        states=tuple(builder.nodes[load][0] for load in loads),
+        depth_mm=float(builder.nodes[largest_n][0][0]),
+        residual=builder.residual,
         touch_down_n=touch_down,
         error=error,
         interpolant=builder.interpolant(touch_down),
         curves=builder.curves(touch_down),
-        solves=press.solves,
-        read_s=builder.read_s,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinState
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
+from tactbench.rigs.twin.contact.press import AnyPress, at_rest
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
@@ -21,7 +21,7 @@ _CLOSED = 1e-12
 _STEPS = 60
 
 
-class LocalPress:
+class LocalPress(AnyPress):
     """Solves a load cell by cell.
 
     Parameters
@@ -39,8 +39,6 @@ class LocalPress:
         For a fluid-backed skin, and for a layer whose Poisson's ratio is above 0.4.
     """
 
-    touched_core = False
-
     def __init__(
         self, skin: FluidBackedShell | FoamPad | BondedLayer, medium: Medium, gap_mm: FloatArray, contact: Contact
     ) -> None:
@@ -55,9 +53,7 @@ class LocalPress:
                 f"{LARGEST_POISSON} it would be off by a fifth in depth and a factor in force.",
                 hint="Use the default rung.",
             )
-        self.medium = medium
-        self.contact = contact
-        self.solves = 0
+        super().__init__(medium, contact)
         self._gap = gap_mm
         self._least_gap = float(gap_mm.min())
         self._springs = float(medium.stiffness[0, 0])
@@ -72,7 +68,6 @@ class LocalPress:
         """
         if force_n <= 0:
             return at_rest(self.medium)
-        self.solves += 1
         depth = self._depth
         deflection, pressure, slope = self._pushed(depth)
         while self._cell * pressure.sum() < force_n:
@@ -91,21 +86,7 @@ class LocalPress:
                 hint="Use the default rung, or check the skin's parameters.",
             )
         self._depth = depth
-        return SkinState(
-            grid=self.medium.grid,
-            force_n=force_n,
-            deflection_mm=deflection,
-            pressure_mpa=pressure,
-            thickness_mm=self.medium.thickness_mm(deflection),
-            depth_mm=depth - self._least_gap,
-            fluid_pressure_mpa=0.0,
-            contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
-            residual=residual,
-        )
-
-    def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
+        return self.state(force_n, deflection, pressure, depth - self._least_gap, residual)
 
     def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
         """Return deflection, contact pressure and the summed stiffness at an approach of `depth`.

@@ -54,9 +54,3 @@ class Medium:
         """Return the (nx, ns) film or layer left."""
         left = self.rest_thickness_mm - deflection_mm
         return np.maximum(left, self.least_thickness_mm) if self.has_core else left
-
-
-def no_local_law(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-    """Return no pressure: the law of media whose whole stiffness is in the Fourier modes."""
-    tangent.fill(0.0)
-    return np.zeros_like(deflection_mm), 0.0

@@ -2,55 +2,60 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.plugin.simulation import SkinGrid, SkinState
+from tactbench.plugin.simulation import SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import TOLERANCE, NewtonSolver, Solution
 from tactbench.rigs.twin.geometry import Contact
 
-_NOTHING = np.zeros((0, 0))
 
+class AnyPress(ABC):
+    """Solver of one contact for forces in any order, on any rung."""
 
-class AnyPress(Protocol):
-    """Interface of the solvers of loads, for every rung."""
+    touched_core = False
 
-    medium: Medium
-    contact: Contact
-    touched_core: bool
-    solves: int
+    def __init__(self, medium: Medium, contact: Contact) -> None:
+        self.medium = medium
+        self.contact = contact
 
+    @abstractmethod
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
 
     def closing_at(self, force_n: float) -> float:
         """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        return -np.inf
+
+    def state(
+        self, force_n: float, deflection_mm: FloatArray, pressure_mpa: FloatArray,
+        depth_mm: float, residual: float, fluid_pressure_mpa: float = 0.0,
+    ) -> SkinState:  # fmt: skip
+        """Return the state of a solved contact."""
+        r2 = (self.medium.grid.x_mm[:, None] - self.contact.x_mm) ** 2
+        r2 = r2 + (self.medium.grid.s_mm[None, :] - self.contact.s_mm) ** 2
+        return SkinState(
+            grid=self.medium.grid,
+            force_n=force_n,
+            deflection_mm=deflection_mm,
+            pressure_mpa=pressure_mpa,
+            thickness_mm=self.medium.thickness_mm(deflection_mm),
+            depth_mm=depth_mm,
+            fluid_pressure_mpa=fluid_pressure_mpa,
+            # sqrt(5/2 <r²>), weighted with the pressure: exact for Hertz, where counting cells is not.
+            contact_radius_mm=float(np.sqrt(2.5 * np.sum(pressure_mpa * r2) / np.sum(pressure_mpa))),
+            residual=residual,
+        )
 
 
 def at_rest(medium: Medium) -> SkinState:
     """Return the state of the skin without contact."""
     zero = np.zeros(medium.spectrum.shape)
-    return SkinState(
-        grid=medium.grid,
-        force_n=0.0,
-        deflection_mm=zero,
-        pressure_mpa=zero,
-        thickness_mm=medium.rest_thickness_mm,
-        depth_mm=0.0,
-        fluid_pressure_mpa=0.0,
-        contact_radius_mm=0.0,
-        residual=0.0,
-    )
-
-
-def scalars(state: SkinState) -> SkinState:
-    """Return `state` without its fields, as a load table keeps it."""
-    return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
+    return SkinState(medium.grid, 0.0, zero, zero, medium.rest_thickness_mm, 0.0, 0.0, 0.0, 0.0)
 
 
 def whole_skin(state: SkinState) -> FloatArray:
@@ -58,14 +63,8 @@ def whole_skin(state: SkinState) -> FloatArray:
     return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
-def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray) -> float:
-    """Return ``sqrt(5/2 <r²>)`` weighted with the pressure: exact for Hertz, where counting cells is not."""
-    r2 = (grid.x_mm[:, None] - contact.x_mm) ** 2 + (grid.s_mm[None, :] - contact.s_mm) ** 2
-    return float(np.sqrt(2.5 * np.sum(pressure_mpa * r2) / np.sum(pressure_mpa)))
-
-
-class Press:
-    """Solver of one contact for forces in any order.
+class Press(AnyPress):
+    """Solver of one contact by the minimiser of the whole energy.
 
     Parameters
     ----------
@@ -91,13 +90,10 @@ class Press:
         fluid_pressure: bool = True,
         tolerance: float = TOLERANCE,
     ) -> None:
-        self.medium = medium
+        super().__init__(medium, contact)
         # From first touch: between cells the gap's smallest value on the grid is not zero, and in its rounding the
         # depth of a piconewton would drown.
         self.gap_mm = gap_mm - gap_mm.min()
-        self.contact = contact
-        self.touched_core = False
-        self.solves = 0
         self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
@@ -109,18 +105,10 @@ class Press:
         if force_n <= 0:
             return at_rest(self.medium)
         solution = self._solve(force_n)
-        pressure = solution.pressure_mpa
-        return SkinState(
-            grid=self.medium.grid,
-            force_n=force_n,
-            deflection_mm=solution.deflection_mm,
-            pressure_mpa=pressure,
-            thickness_mm=self.medium.thickness_mm(solution.deflection_mm),
-            depth_mm=solution.depth_mm,
-            fluid_pressure_mpa=self._fluid_pressure(solution),
-            contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
-            residual=solution.residual,
-        )
+        return self.state(
+            force_n, solution.deflection_mm, solution.pressure_mpa,
+            solution.depth_mm, solution.residual, self._fluid_pressure(solution),
+        )  # fmt: skip
 
     def closing_at(self, force_n: float) -> float:
         """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
@@ -139,7 +127,6 @@ class Press:
             if self._core is not None:
                 self.medium = self._core(self.medium)
                 self._solver = NewtonSolver(self.medium, self.gap_mm)
-                self.solves += 1
                 solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
         self._solutions[force] = solution
         return solution
@@ -149,7 +136,6 @@ class Press:
 
         A state guessed for loads of a fraction of a piconewton is off by more than such a load can move.
         """
-        self.solves += 1
         guess = self._guess(force)
         if guess is not None:
             try:

@@ -49,22 +49,16 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
         If this rung is known to be wrong for this skin.
     """
     press = press_of(run, fidelity)
-    return press, reader_of(run, names, fidelity)
-
-
-def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
-    """Return the function that reads the channels `names` from a solved skin of `run`; raises as :func:`pressed`."""
     if not names:
-        return whole_skin
-    skin = run.skin
-    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
+        return press, whole_skin
+    grid = press.medium.grid
     read = _reader(run.sensor, grid, names, fidelity)
     if not (run.tangential or run.sensor.spec.reads_shear):
-        return read
+        return press, read
     from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 
-    along = tangential_of(skin, grid) if run.tangential else None
-    return lambda state: read(state if state.shear_mpa is not None else pressed_state(state, along))
+    along = tangential_of(run.skin, grid) if run.tangential else None
+    return press, lambda state: read(state if state.shear_mpa is not None else pressed_state(state, along))
 
 
 def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
+from tactbench.rigs.twin.contact.pressing import pressed, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
@@ -137,49 +138,31 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    began = run.clock()
-    made, read_s = _tabulate(run, names, largest, within_reach=not only_skin)
-    # The effect that needs it first takes all of the time; reading belongs to transduction, the rest to the contact.
-    for effect, spent in (("transduction", read_s), ("contact", run.clock() - began - read_s)):
-        if not spent:
-            continue
-        run.spent_s[effect] = run.spent_s.get(effect, 0.0) + spent
-        run.elsewhere_s += spent
+    began = time.perf_counter()
+    made = _tabulate(run, names, largest, within_reach=not only_skin)
+    # Whichever effect needs the table first, its time is that of the contact.
+    spent = time.perf_counter() - began
+    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
+    run.elsewhere_s += spent
     _TABLES[key] = made
     if len(_TABLES) > _MOST_TABLES:
         _TABLES.popitem(last=False)
     return made
 
 
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> tuple[_Tabulated, float]:
-    """Return the table, and the seconds spent on preparing the transducer and reading the skin."""
-    fidelity = run.fidelity
-    press = press_of(run, fidelity)
-    began = run.clock()
-    read = reader_of(run, names, fidelity)
-    prepared_s = run.clock() - began
-    table = build_table(
-        press,
-        read,
-        largest_n=largest,
-        tolerance=_tolerance(run, names),
-        most_nodes=fidelity.most_nodes,
-        clock=run.clock,
-    )
-    slide = slide_of(run)
-    began = run.clock()
-    sliding = None
+def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
+    press, read = pressed(run, names, run.fidelity)
+    tolerance, nodes = _tolerance(run, names), run.fidelity.most_nodes
+    table = build_table(press, read, largest_n=largest, tolerance=tolerance, most_nodes=nodes)
+    slide, sliding = slide_of(run), None
     if names and slide is not None:
         from tactbench.rigs.twin.contact.slide_table import build_slide_table
 
         sliding = build_slide_table(press, read, table, run.skin, *slide)
-    slide_s = run.clock() - began
-    closing = press.closing_at(largest)
     if within_reach:
         check_reach(press, largest, run.skin.sheet)
-    remarked = remarks(press, table.loads_n.tolist(), run.skin.sheet)
-    tabulated = _Tabulated(table, sliding, press.touched_core, closing, remarked)
-    return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
+    remarked = remarks(press, largest, run.skin.sheet)
+    return _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
@@ -210,13 +193,10 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
 
 def _report(run: Synthesis, tabulated: _Tabulated) -> None:
     table = tabulated.table
-    deepest = table.states[-1]
     run.drawn.update(
-        table_nodes=table.loads_n.size,
-        table_solves=table.solves,
         table_error_count=float(table.error.max(initial=0.0)),
         solver_residual=table.residual,
-        depth_mm=deepest.depth_mm,
+        depth_mm=table.depth_mm,
         **tabulated.remarks,
     )
     if run.rung_error is not None:
@@ -230,4 +210,4 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         run.settled["core"] = Settled(True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N", None)
     elif not tabulated.touched_core:
         left = f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
-        run.settled["core"] = Settled(False, f"never touches the core below {deepest.force_n:g} N: {left}")
+        run.settled["core"] = Settled(False, f"never touches the core below {table.loads_n[-1]:g} N: {left}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -46,32 +45,24 @@ def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
         )
 
 
-def remarks(press: AnyPress, loads_n: Iterable[float], sheet: SkinSheet) -> dict[str, Scalar]:
-    """Return remarks on the validity of a contact on `sheet` at the largest of `loads_n`, which `press` has solved.
+def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar]:
+    """Return remarks on the validity of a contact on `sheet` under `force` newtons.
 
     Returns
     -------
     dict
         ``contact_radius_cells``: radius of the contact in cells, from its area, or half its width where the indenter
-        is neither a cap nor flat; ``resolved_above_n``: the least of `loads_n` at which it is at least
-        :data:`RESOLVED_CELLS`; and one sentence under each ``remark …`` that applies.
+        is neither a cap nor flat; and one sentence under each ``remark …`` that applies.
     """
-    loads = sorted(load for load in loads_n if load > 0)
-    if not loads:
+    if not force > 0:
         return {}
-    force = loads[-1]
     pressure = press(force).pressure_mpa
     shape = press.contact.shape
-    cells = _radius_cells if shape is None else _narrow_cells
-    found: dict[str, Scalar] = {"contact_radius_cells": cells(pressure)}
-    for load in loads:
-        if cells(press(load).pressure_mpa) >= RESOLVED_CELLS:
-            found["resolved_above_n"] = load
-            break
-    else:
+    cells = math.sqrt(np.count_nonzero(pressure) / math.pi) if shape is None else _narrow_cells(pressure)
+    found: dict[str, Scalar] = {"contact_radius_cells": cells}
+    if cells < RESOLVED_CELLS:
         found["remark contact"] = (
-            f"the contact is {cells(pressure):.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} "
-            "it follows the mesh"
+            f"the contact is {cells:.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} it follows the mesh"
         )
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
@@ -94,10 +85,6 @@ def remarks(press: AnyPress, loads_n: Iterable[float], sheet: SkinSheet) -> dict
     if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"
     return found
-
-
-def _radius_cells(pressure: FloatArray) -> float:
-    return math.sqrt(np.count_nonzero(pressure) / math.pi)
 
 
 def _narrow_cells(pressure: FloatArray) -> float:

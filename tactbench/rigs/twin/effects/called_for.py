@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tactbench.plugin import ChannelKind, Quantity, Scene, SensorSpec
-from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason, SkinSheet
-from tactbench.rigs.twin.effects.heated_core import NEEDED, THERMISTOR, HeatedCore
+from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
+from tactbench.rigs.twin.effects.heated_core import NEEDED, THERMISTOR
 
 NOT_OBSERVED = "no observed channel depends on it"
 NO_LOAD = "the scene has no load: 0 N throughout"
 NO_FLUID = "the skin holds no fluid"
-_HEATED: tuple[ChannelKind, ...] = ("taxel", "dc_temperature", "ac_temperature")
 
 
 def _no(text: str, unit: str = "count") -> Reason:
@@ -103,14 +100,11 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
     share = sum(term.fraction.to("1") for term in terms)
     if not terms or not share:
         return _no("the spec states no creep for the observed channels")
-    if scene.drive is not None:
-        return Reason(True, f"a motor's force loop may change the load at any rate; {100 * share:.0f} % comes late")
     profile = scene.profile
-    if len(set(profile.corners[1])) == 1:
+    if scene.drive is None and len(set(profile.corners[1])) == 1:
         return _no(f"the load is constant: {profile.corners[1][0]:g} N throughout")
     slowest = max(term.tau.to("s") for term in terms)
-    late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"
-    return Reason(True, f"{late}; left out if that is below a third of noise and rounding by the scene's load table")
+    return Reason(True, f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s")
 
 
 def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -265,7 +259,7 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
     return Reason(True, f"the fluid's pressure within {bands[0]}")
 
 
-# Heat: bounds in counts, without numerics on the skin.
+# Heat.
 
 
 def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -289,118 +283,26 @@ def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tup
 
 
 def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a contact warms or cools the core by more than an observed channel would hide.
-
-    Behind a contact of conductance G the core follows the indenter, D kelvin away, by at most ``D G t / C`` and never
-    by more than D. G is at most that of a contact whose whole load stands as far out as the cap or the sheet allows.
-    """
-    observed = [kind for kind in _HEATED if kind in scene.observe]
-    silent = NOT_OBSERVED if not observed else _no_heat(scene, sensor)
-    if silent is not None:
-        return _no(silent)
-    most_k, indenter = _most_k(scene, sensor), scene.environment.indenter_temperature
-    counts = {kind: _counts_per_k(kind, scene, sensor) * most_k for kind in observed}
-    text = (
-        f"indenter at {indenter} on a core of {_ends_c(scene, sensor)[0]:.1f} degC, "
-        f"{_difference_k(scene, sensor):.2g} K apart: the core moves by at most {most_k:.2g} K, "
-        f"a reading by {max(counts.values()):.2g} counts"
-    )
-    return _above_the_noise(counts, text, scene, sensor)
+    """Return whether heat flows through the contact: the scene states a temperature of its indenter."""
+    missing = [name for name in (*NEEDED, "contact_conductivity") if name not in sensor.parameters]
+    if missing:
+        return _no(f"the spec states no {', '.join(missing)}")
+    indenter = scene.environment.indenter_temperature
+    if indenter is None:
+        return _no("the scene's indenter is as warm as what it touches: 0 K apart")
+    if not scene.profile.largest_n > 0:
+        return _no(NO_LOAD)
+    return Reason(True, f"an indenter at {indenter} touches a heated core in a room at {scene.environment.ambient}")
 
 
 def thermal_drift(scene: Scene, sensor: SensorSpec) -> Reason:
     """Return whether resistive channels follow a core that the contact warms or cools."""
+    coefficient = sensor.parameters.get("conductivity_coefficient")
     if "taxel" not in scene.observe:
         return _no(NOT_OBSERVED)
-    if "conductivity_coefficient" not in sensor.parameters:
+    if coefficient is None:
         return _no("the spec states no coefficient of a fluid's conductivity")
-    silent = _no_heat(scene, sensor)
-    if silent is not None:
-        return _no(silent)
-    most = _counts_per_k("taxel", scene, sensor) * _most_k(scene, sensor)
-    per_k = 100 * sensor.parameters["conductivity_coefficient"].to("1/K")
-    text = f"conductivity changes by {per_k:g} % of that at 25 degC per kelvin: at most {most:.2g} counts"
-    return _above_the_noise({"taxel": most}, text, scene, sensor)
-
-
-def _above_the_noise(counts: dict[ChannelKind, float], text: str, scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether any kind of channel may move by more than a third of its noise and rounding."""
-    scale, stated = scene.environment.noise_scale, sensor.nuisances
-    hidden = {kind: stated[kind].hidden(scale) if kind in stated else 0.0 for kind in counts}
-    most = max(counts.values())
-    if all(count <= hidden[kind] / 3 for kind, count in counts.items()):
-        least = min(hidden.values())
-        return Reason(False, f"{text}, below a third of noise and rounding ({least:.2g})", most)
-    return Reason(True, text, most)
-
-
-def _no_heat(scene: Scene, sensor: SensorSpec) -> str | None:
-    """Return the reason why no heat can flow through the contact, or None."""
-    missing = [name for name in (*NEEDED, "contact_conductivity") if name not in sensor.parameters]
-    if missing:
-        return f"the spec states no {', '.join(missing)}"
-    if scene.environment.indenter_temperature is None:
-        return "the scene's indenter is as warm as what it touches: 0 K apart"
-    return None if scene.profile.largest_n > 0 else NO_LOAD
-
-
-def _ends_c(scene: Scene, sensor: SensorSpec) -> tuple[float, float]:
-    """Return the temperature of the untouched core at the scene's first and last moment: it moves one way only."""
-    core = HeatedCore.of(scene, sensor)
-    if core is None:
-        return 25.0, 25.0
-    first, last = core.untouched(scene, np.array([0.0, scene.profile.duration.to("s")]))
-    return float(first), float(last)
-
-
-def _difference_k(scene: Scene, sensor: SensorSpec) -> float:
-    indenter = scene.environment.indenter_temperature
-    return 0.0 if indenter is None else max(abs(end - indenter.to("degC")) for end in _ends_c(scene, sensor))
-
-
-def widest_contact_mm(scene: Scene, sheet: SkinSheet) -> float:
-    """Return an upper bound on the radius of a contact, mm.
-
-    It is sqrt(5/2) times the rms distance of the load from the apex. None of it stands beyond the sheet's other corner,
-    nor beyond a cap's rim, which along the arc is at most pi/2 times as far as straight.
-    """
-    farthest = math.hypot(sheet.x_max.to("mm") - sheet.x_min.to("mm"), sheet.arc.to("mm"))
-    if scene.indenter.radius is not None:
-        farthest = min(farthest, math.pi / 2 * scene.indenter.radius.to("mm"))
-    return math.sqrt(5 / 2) * farthest
-
-
-def _most_k(scene: Scene, sensor: SensorSpec) -> float:
-    if sensor.skin is None:
-        return 0.0
-    widest = widest_contact_mm(scene, sensor.skin.sheet)
-    conductance = 4e-3 * sensor.parameters["contact_conductivity"].to("W/m/K") * widest
-    profile = scene.profile
-    # A force loop touches the skin while it waits, too.
-    idle = 0.0 if profile.corners[1][0] > 0 or scene.drive is not None else profile.hold_s
-    pressed_s = max(profile.duration.to("s") - idle, 0.0)
-    share = min(1.0, conductance * pressed_s / sensor.parameters["heat_capacity"].to("J/K"))
-    return _difference_k(scene, sensor) * share
-
-
-def _counts_per_k(kind: ChannelKind, scene: Scene, sensor: SensorSpec) -> float:
-    """Return an upper bound on the change of a reading of `kind` per kelvin of the core, in counts."""
-    top = max(channel.upper or 1.0 for channel in sensor.channels(kind))
-    if kind == "taxel":
-        coefficient = sensor.parameters.get("conductivity_coefficient")
-        if coefficient is None:
-            return 0.0
-        # d reading / d ln(conductivity) = top r/(1 + r)^2 <= top/4; relative to 25 degC, so most where it is coldest.
-        indenter, per_k = scene.environment.indenter_temperature, coefficient.to("1/K")
-        coldest = min(*_ends_c(scene, sensor), 25.0 if indenter is None else indenter.to("degC"))
-        return top / 4 * per_k / max(1.0 + per_k * (coldest - 25.0), 0.1)
-    if "thermistor_b" not in sensor.parameters:
-        return 0.0
-    # x = p/(exp(b/T) + q): d x / d T = x (1 - x q/p) b/T^2 <= p/(4 q) b/T^2; nothing is colder than 250 K here.
-    p, q, b = (sensor.parameters[f"thermistor_{name}"].value for name in "pqb")
-    slope = top * p / (4 * q) * b / 250.0**2
-    if kind == "dc_temperature":
-        return slope
-    gain = sensor.parameters.get("thermal_gain")
-    # The high-pass gives its input less a mean of its past: at most the input's whole range.
-    return 0.0 if gain is None else slope * gain.to("1")
+    found = contact_heat(scene, sensor)
+    if not found.called_for:
+        return found
+    return Reason(True, f"conductivity changes by {100 * coefficient.to('1/K'):g} % of that at 25 degC per kelvin")

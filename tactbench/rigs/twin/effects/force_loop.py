@@ -46,12 +46,7 @@ def apply(run: Synthesis) -> None:
     depths = model.simulate(force_n, setpoint, noise, start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
     run.follow(Load(t_s, forces))
-    run.drawn.update(
-        loop_delay_steps=model.delay_steps,
-        loop_error_rms_n=float(np.sqrt(np.mean((forces - setpoint) ** 2))),
-        loop_largest_n=float(forces.max()),
-        loop_steps_at_end=int(np.count_nonzero(depths >= deepest)),
-    )
+    run.drawn["loop_steps_at_end"] = int(np.count_nonzero(depths >= deepest))
 
 
 def force_at_depth(table: LoadTable) -> tuple[Callable[[float], float], float]:

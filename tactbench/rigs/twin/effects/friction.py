@@ -66,15 +66,5 @@ def apply(run: Synthesis) -> None:
         run.reference_more[name] = (ChannelSpec(name=name, kind="force", unit="N"), share * seen.force_n)
     run.reference_more["slip"] = (ChannelSpec(name="slip", kind="position", unit="m"), 1e-3 * seen.slip_mm)
     for name, values in (("slipping", seen.slipping.astype(np.float64)), ("stick_ratio", seen.stick_ratio)):
-        run.reference_more[name] = (
-            ChannelSpec(name=name, kind="other", unit="1", lower=0.0, upper=1.0),
-            values,
-        )
-    run.drawn.update(
-        slide_mm_s=drive.speed_mm_s,
-        friction_static=drive.static,
-        friction_kinetic=drive.kinetic,
-        slips=int(dragged.let_go_s.size),
-        tangential_stiffness_n_mm=float(drive.stiffness[-1]),
-        largest_tangential_n=float(np.abs(seen.force_n).max(initial=0.0)),
-    )
+        run.reference_more[name] = (ChannelSpec(name=name, kind="other", unit="1", lower=0.0, upper=1.0), values)
+    run.drawn["slips"] = int(dragged.let_go_s.size)

@@ -88,23 +88,6 @@ def thermal_drift(run: Synthesis) -> None:
                 track.readings[:, column] = through_divider(track.readings[:, column], gained, upper)
 
 
-def largest_stretch(run: Synthesis) -> float:
-    """Return an upper bound, at least 1, on the factor by which thermal drift stretches a difference of two readings.
-
-    A divider's reading behind a resistance divided by g has the slope ``g / (1 + (g - 1) E/top)²`` against the reading
-    E before, which is at most g or 1/g. The core is never warmer or colder than its untouched self and the indenter.
-    """
-    core = HeatedCore.of(run.scene, run.sensor.spec)
-    coefficient = run.sensor.spec.parameters.get("conductivity_coefficient")
-    indenter = run.scene.environment.indenter_temperature
-    if core is None or coefficient is None or indenter is None:
-        return 1.0
-    ends = core.untouched(run.scene, run.t_s[[0, -1]])  # it moves one way only
-    untouched = relative_conductivity(ends, coefficient.to("1/K"))
-    reached = relative_conductivity(np.append(ends, indenter.to("degC")), coefficient.to("1/K"))
-    return float(max(reached.max() / untouched.min(), untouched.max() / reached.min()))
-
-
 def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) -> FloatArray:
     """Return what a divider reads when its resistance falls by the factor `gained`: ``E = top/(1 + R/R_ref)``.
 

@@ -15,7 +15,7 @@ nodes of a grid. There are no time steps: the end of a phase is computed in clos
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -52,27 +52,6 @@ class Drive:
     """(m,) tangential stiffness of the skin, N/mm; above 0 where there is a load."""
 
 
-@dataclass
-class _Phases:
-    """Phases of the motion, column by column; a phase lasts until the next one begins."""
-
-    t_s: list[float] = field(default_factory=list)
-    kind: list[int] = field(default_factory=list)
-    x_mm: list[float] = field(default_factory=list)
-    """Deflection of the skin at the beginning of the phase."""
-    e_mm: list[float] = field(default_factory=list)
-    """Equilibrium of a slip; of a held skin, the deflection at which tractions were last proportional to pressure."""
-    friction: list[float] = field(default_factory=list)
-    """Kinetic friction coefficient of a slip."""
-
-    def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0, friction: float = 0.0) -> None:
-        self.t_s.append(t_s)
-        self.kind.append(kind)
-        self.x_mm.append(x_mm)
-        self.e_mm.append(e_mm)
-        self.friction.append(friction)
-
-
 class Dragged:
     """The state of the skin that a `drive` drags, at any moment."""
 
@@ -96,13 +75,12 @@ class Dragged:
         self._way_mm = drive.speed_mm_s * drive.t_s
         self._x_t: list[FloatArray] = []
         self._x_mm: list[FloatArray] = []
-        self._phases = _Phases()
+        self._phases: list[tuple[float, int, float, float, float]] = []
+        """Beginning [s] and kind of each phase, which lasts until the next one begins; deflection of the skin at its
+        beginning [mm]; equilibrium of a slip or, of a held skin, the deflection at which tractions were last
+        proportional to pressure [mm]; kinetic friction coefficient of a slip."""
         self._run()
-        self._begin = np.array(self._phases.t_s)
-        self._kind = np.array(self._phases.kind)
-        self._from = np.array(self._phases.x_mm)
-        self._about = np.array(self._phases.e_mm)
-        self._friction = np.array(self._phases.friction)
+        self._begin, self._kind, self._from, self._about, self._friction = np.array(self._phases).T
         self._knots_t = np.concatenate([*self._x_t, [np.inf]])
         self._knots_mm = np.concatenate([*self._x_mm, [0.0]])
 
@@ -135,9 +113,12 @@ class Dragged:
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
         return np.asarray(drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness)
 
+    def _add(self, t_s: float, kind: int, x_mm: float, about_mm: float = 0.0, friction: float = 0.0) -> None:
+        self._phases.append((t_s, kind, x_mm, about_mm, friction))
+
     def _run(self) -> None:
-        drive, phases = self.drive, self._phases
-        phases.add(-math.inf, REST, 0.0)
+        drive = self.drive
+        self._add(-math.inf, REST, 0.0)
         end = min(drive.end_s, float(drive.t_s[-1]))
         t, x, since = drive.start_s, 0.0, 0.0
         sliding = bool(np.interp(t, drive.t_s, drive.load_n) <= _LEAST_LOAD_N)
@@ -147,7 +128,7 @@ class Dragged:
                 sliding, since = False, x
                 continue
             since = x
-            phases.add(t, STICK, x)
+            self._add(t, STICK, x)
             t, x = self._lets_go(t, x, end)
             if t >= end:
                 break
@@ -156,7 +137,7 @@ class Dragged:
             sliding = math.isinf(lasting)
             if sliding:
                 lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
-            phases.add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
+            self._add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
             lasting = min(lasting, end - t)
             u = deflection_after(drive.mode, x - about, drive.speed_mm_s, lasting)
             # A slip of no length at all would let go again at the same moment, for ever.
@@ -204,7 +185,7 @@ class Dragged:
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
         deflection = bristle_below(knots, drive.speed_mm_s, limit, x, most)
-        self._phases.add(t, SLIDE, x)
+        self._add(t, SLIDE, x)
         self._x_t.append(knots)
         self._x_mm.append(deflection)
         return until, float(deflection[-1])
@@ -212,7 +193,7 @@ class Dragged:
     def _hold(self, t: float, x: float, since: float) -> None:
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
-        self._phases.add(t, HELD, x, since)
+        self._add(t, HELD, x, since)
         self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
         now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
         held = np.concatenate([[now], self._release_mm[first:]])

@@ -112,16 +112,6 @@ def test_readings_follow_the_tangential_force_of_the_recording():
     assert np.all(readings[seen.force_n > 0.1][:, 2] > readings[0, 2])
 
 
-def test_the_other_way_everything_tangential_turns():
-    # The magnet is beside the contact: what the press alone does is taken off. No profile lifts the skin.
-    smooth = Simulation(effects=("-skin-vibration",))
-    _, there = _readings(SENSOR, _scene(simulation=smooth))
-    _, back = _readings(SENSOR, _scene(angle_deg=180.0, simulation=smooth))
-    _, still = _readings(SENSOR, _scene(simulation=smooth).model_copy(update={"slide": None}))
-    assert np.abs(there - still)[:, :4].max() > 0.05
-    np.testing.assert_allclose((back - still)[:, :4], -(there - still)[:, :4], atol=1e-12)
-
-
 def test_it_costs_nothing_where_nobody_looks_along_the_skin():
     for spec, scene in (
         (SPEC.model_copy(update={"reads_shear": ()}), _scene()),

@@ -53,6 +53,7 @@ def test_whatever_moves_the_force_comes_before_what_reads_it(specs):
     for effects in (EFFECTS, EFFECTS[::-1]):
         names = [effect.name for effect in plan_scene(effects, scene, specs["icub"]).stages]
         assert [name for name in names if name.startswith("force-")] == ["force-loop", "force-noise", "force-filter"]
+        assert names.index("contact") < names.index("creep") < names.index("transduction") < names.index("converter")
 
 
 def test_it_begins_settled(sensors):
