@@ -1,29 +1,30 @@
-"""What a check is, what it looks at, and what can come of it; and the checks of every plugin."""
+"""Checks, their subjects and outcomes, and the checks of every plugin."""
 
 from __future__ import annotations
 
 import inspect
 import io
 import os
-import random
+import re
 import subprocess
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn, get_args
+from unittest.mock import patch
 
 import numpy as np
 
 from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.interfaces import Operator
-from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
+from tactbench.core.plugins.registry import Registry, ask_plugin, line_in, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
 EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
@@ -32,13 +33,6 @@ KINDS = EVERY_KIND[:-1]
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""
-CODE = (
-    "transducer", "driver", "emulator", "log_reader", "features_by", "where", "called_for", "verification",
-    "work_precision", "likeness", "file", "check", "emulators",
-)  # fmt: skip
-"""Fields of descriptors that name code."""
-
-
 HEAVY = frozenset({
     "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
@@ -46,7 +40,7 @@ HEAVY = frozenset({
 """Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
 
 
-IMPORT_S, THREAD_S = 1.0, 1.0  # a plugin's import may take so long [s of a processor], and a thread to end
+THREAD_S = 1.0  # time for a thread to end
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -71,42 +65,42 @@ class CheckSkipped(Exception):  # noqa: N818  (a result, not a failure)
 
 
 class CheckOutcome(NamedTuple):
-    """What came of a check."""
+    """Outcome of a check."""
 
     check: str
     status: Literal["passed", "failed", "skipped"]
     where: str = ""
     """The field or line at fault."""
     text: str = ""
-    """What is wrong, or why it was skipped."""
+    """The mistake, or the reason for which it was skipped."""
     advice: str = ""
-    """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
+    """Advice; empty where the plugin's code raised, since `where` and `text` are then all that is known."""
     seconds: float | None = None
-    """How long it took; None: it was stopped, or not tried."""
+    """Duration; None for a check that was stopped or not tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A plugin's sensor, rig, device … under check, and what else is installed."""
+    """A plugin's sensor, rig, device … under check, with the registry of all plugins."""
 
     kind: Kind
     name: str
     module: str
-    """The plugin's, as its entry point names it; of a data set the mapping file."""
+    """Module of the plugin's entry point, or the mapping file of a data set."""
     distribution: str
     registry: Registry
     recording: Path | None = None
-    """What is read in the mode `recording`."""
+    """Recording that is read in the mode `recording`."""
     rig_file: Path | None = None
-    """What is opened in the mode `invasive`."""
+    """Rig file of the devices that are opened in the mode `invasive`."""
     operator: Operator | None = None
-    """Who stands at the rig in the mode `invasive`."""
+    """Operator of the rig in the mode `invasive`."""
     root: Path | None = None
     """A folder that holds the files of a data set."""
 
     @cached_property
     def descriptor(self) -> Any:
-        """What the plugin's hook gives in this very process; CheckFailed if it does not."""
+        """Descriptor that the plugin's hook gives in this process; CheckFailed if it does not."""
         try:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
             return next(one for one in offered if one.name == self.name)
@@ -123,43 +117,35 @@ class Subject:
         """The top of the plugin's module names."""
         return self.module.partition(".")[0]
 
-    def names_code(self, field: str) -> str | None:
-        """Return ``module:callable`` of a field; None: it names none."""
-        found = getattr(self.descriptor, field, getattr(self.spec, field, None))
-        return found if isinstance(found, str) else None
-
     def code(self, field: str) -> Any:
-        """Return what a field of the descriptor names, imported."""
-        return load_object(self.names_code(field) or "")
+        """Return the object that a field of the descriptor or the spec names, imported."""
+        return load_object(getattr(self.descriptor, field, None) or getattr(self.spec, field))
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that is checked of a plugin."""
+    """A check of some kinds of plugins."""
 
     name: str
     """Lower case with hyphens; unique among the checks of a kind."""
     kinds: tuple[Kind, ...]
     mode: Mode
     why: str
-    """Why it exists, in one sentence."""
+    """The mistake that it finds, in one sentence."""
     cure: str
-    """What to do when it fails, in one sentence."""
+    """Advice when it fails, in one sentence."""
     needs: tuple[str, ...]
-    """Checks that must have passed; otherwise it is skipped."""
+    """Names of checks that must have passed; otherwise it is skipped."""
     run: Callable[[Subject], None]
     """Raises CheckFailed, or CheckSkipped."""
 
 
 CHECKS: list[Check] = []
-"""All of them, in the order in which they run: a check stands behind those that it needs."""
+"""All checks in the order in which they run, each after those that it needs."""
 
 
 def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Callable[[Subject], None]], Check]:
-    """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do.
-
-    `needs` are names of checks.
-    """
+    """Make a check of a function, by its name; its docstring has `why` and, as a second paragraph, `cure`."""
 
     def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
@@ -191,19 +177,8 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
     except NotApplicable as reason:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
-        line = line_in(subject.package, error.__traceback__)
-        raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
-
-
-def line_in(package: str, trace: TracebackType | None) -> str:
-    """Return ``file, line N`` of the innermost frame in a package; "" if none is in it."""
-    found = ""
-    while trace is not None:
-        if trace.tb_frame.f_globals.get("__name__", "").partition(".")[0] == package:
-            file = trace.tb_frame.f_code.co_filename.replace("\\", "/").split("/")
-            found = f"{'/'.join(file[-2:])}, line {trace.tb_lineno}"
-        trace = trace.tb_next
-    return found
+        line = line_in(subject.package, "".join(traceback.format_exception(error)))
+        raise CheckFailed(f"{field}{line}", error_text(error)) from error
 
 
 @check(*KINDS)
@@ -212,7 +187,8 @@ def code_names_resolve(subject: Subject) -> None:
 
     Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
     """
-    named = [field for field in CODE if subject.names_code(field)]
+    fields = [*subject.descriptor, *subject.spec]
+    named = [name for name, value in fields if isinstance(value, str) and re.fullmatch(r"[\w.]+:[\w.]+", value)]
     if not named:
         skip("its descriptor names no code")
     for field in named:
@@ -220,33 +196,21 @@ def code_names_resolve(subject: Subject) -> None:
             subject.code(field)
 
 
-def _shared() -> dict[str, Any]:
-    """Return what all code of a process shares."""
-    return {
-        "the seed of numpy's global generator": np.random.get_state(legacy=False)["state"]["key"].tobytes(),  # noqa: NPY002
-        "the seed of Python's global generator": random.getstate()[1][:-1],
-        "how numpy treats floating-point errors": np.geterr(),
-        "the current folder": Path.cwd(),
-    }
+def _seeded(*_: Any) -> NoReturn:
+    raise PluginError("It seeds a global generator.", hint="Draw from a generator of your own.")
 
 
 @contextmanager
 def unchanged(subject: Subject) -> Iterator[None]:
-    """Fail where a plugin's code changes what it shares with all others, prints, or lets a thread of a driver run on.
-
-    A generator that is drawn from keeps its words of state for 624 draws from position 0: libraries draw some.
-    """
-    state = np.random.get_state(legacy=False)  # noqa: NPY002
-    state["state"]["pos"] = 0
-    np.random.set_state(state)  # noqa: NPY002
-    version, (*own, _), following = random.getstate()
-    random.setstate((version, (*own, 0), following))
-    before, threads = _shared(), set(threading.enumerate())
-    with redirect_stdout(io.StringIO()) as printed, np.errstate():
+    """Fail where a plugin's code changes what it shares with all others, prints, or leaves a thread of a driver."""
+    before, threads = (np.geterr(), Path.cwd()), set(threading.enumerate())
+    with (
+        patch("numpy.random.seed", _seeded), patch("random.seed", _seeded),
+        redirect_stdout(io.StringIO()) as printed, np.errstate(),
+    ):  # fmt: skip
         yield
-        changed = [name for name, state in _shared().items() if state != before[name]]
-    if changed:
-        fail(subject.package, f"its code changes {changed[0]}: draw from a generator of your own, and set nothing")
+        if (np.geterr(), Path.cwd()) != before:
+            fail(subject.package, "its code changes numpy's treatment of errors, or the current folder")
     if printed.getvalue():
         fail(subject.package, f"its code prints {printed.getvalue()[:40]!r}: results of commands go to stdout")
     for thread in set(threading.enumerate()) - threads if subject.kind in ("sensor", "device") else ():
@@ -262,25 +226,19 @@ def import_is_light(subject: Subject) -> None:
     Move imports of large packages into the module that the descriptor names, or into functions; compute and read
     nothing there.
     """
-    took, *modules = _imported_with(subject.module)
-    heavy = sorted(HEAVY.intersection(modules))
+    heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
     if heavy:
         fail(subject.module, f"its import also imports {', '.join(heavy)}")
-    if float(took) > IMPORT_S:
-        fail(subject.module, f"its import takes {float(took):.2g} s of a processor, and every command waits for it")
 
 
 @lru_cache(maxsize=64)
 def _imported_with(module: str) -> list[str]:
-    """Return how long the import of a module takes [s of a processor], and the modules of an interpreter with it.
-
-    What tactbench itself imports is neither counted nor heavy.
-    """
+    """Return the modules of a fresh interpreter that has imported a module, without those of tactbench's own door."""
     path = os.pathsep.join(part for part in sys.path if part)
-    code = f"import sys, time, tactbench.plugin.devices; a = time.process_time(); import {module}; "
+    code = f"import sys, tactbench.plugin.devices; a = {{*sys.modules}}; import {module}; print(*{{*sys.modules}} - a)"
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", f"{code}print(time.process_time() - a, *sys.modules)"],
-        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
+        [sys.executable, "-W", "ignore", "-c", code], env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
     )  # fmt: skip
     if done.returncode != 0:
         fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")

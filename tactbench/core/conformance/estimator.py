@@ -20,7 +20,7 @@ SAME_ROW = 1e-6  # relative difference of one row answered alone and among other
 
 
 def question(kind: str) -> list[Any]:
-    """Return X, y, new X and new y of a question that some of the features answer, the last most; one is constant."""
+    """Return X, y, new X and new y, read-only: y is linear in some features, in the last most; one is constant."""
     rng = np.random.default_rng(0)
     X = rng.normal(size=(ROWS + NEW_ROWS, FEATURES))
     y = LEVEL + X @ np.array([0.5, 0.0, 0.0, 0.0, 0.0, -1.0, 2.0]) + 0.2 * rng.normal(size=len(X))
@@ -29,11 +29,12 @@ def question(kind: str) -> list[Any]:
         y = np.digitize(y, (LEVEL - 1.0, LEVEL + 1.0)).astype(np.int64)
     if kind == "events":  # which frames hold one
         y = (y > LEVEL).astype(np.int64)
+    X.flags.writeable = y.flags.writeable = False
     return [X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]]
 
 
 def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *, given: Any = None) -> Answer:
-    """Fit as an evaluation does, by default as in the rehearsal; return what answers rows and checks its answers."""
+    """Fit as an evaluation does, by default with the parameters of the rehearsal; return its checked `predict`."""
     from tactbench.core.evaluation.fitting import answers, fit
 
     X, y, *_ = given or question(kind)
@@ -58,14 +59,10 @@ def answers_have_the_shape(subject: Subject) -> None:
     1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y. Give candidates of the type that a parameter needs:
     5, not 5.0, for a number of neighbours.
     """
-    for kind in subject.descriptor.kinds:
-        given = question(kind)
-        _taught(subject, kind, given=given)(given[2])
-        for name, now, old in zip(("fit: X", "fit: y", "predict: X"), given, question(kind), strict=False):
-            if not np.array_equal(now, old):
-                fail(name, "it was changed in place")
-        _taught(subject, kind, given=[one[:FEW_ROWS] for one in given], place=f"{FEW_ROWS} rows: ")
     descriptor = subject.descriptor
+    for kind in descriptor.kinds:
+        _taught(subject, kind)(question(kind)[2])
+        _taught(subject, kind, given=[one[:FEW_ROWS] for one in question(kind)], place=f"{FEW_ROWS} rows: ")
     for name, candidates in descriptor.grid.items():
         for one in candidates:
             params = {**(descriptor.rehearsal or {}), name: one}
@@ -83,10 +80,10 @@ def seed_and_data_decide(subject: Subject) -> None:
         X, y, new, _ = question(kind)
         answer = _taught(subject, kind)
         together = answer(new)
-        alone = np.concatenate([answer(new[place : place + 1]) for place in range(5)])
+        one_by_one = np.concatenate([answer(new[place : place + 1]) for place in range(5)])
         drawn = subject.descriptor.looks_at == "nothing"
-        if not drawn and not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
-            fail("predict", "a row asked alone is answered otherwise than among others")
+        if not drawn and not np.allclose(one_by_one, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
+            fail("predict", "a row by itself gets another answer than among others")
         _taught(subject, kind, given=(-X, y[::-1].copy()))
         if not np.array_equal(_taught(subject, kind)(new), together):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
@@ -104,12 +101,8 @@ def it_learns(subject: Subject) -> None:
         _, y, new, truth = question(kind)
         given = _taught(subject, kind, {})(new)
         if kind == "events":  # scores, the higher the surer
-            error, bar = -given[truth == 1].mean(), -given[truth == 0].mean() / BETTER
-        elif kind == "regression":
-            error, bar = np.sqrt(np.mean((given - truth) ** 2)), np.sqrt(np.mean((y.mean() - truth) ** 2))
-        else:
-            error, bar = np.mean(given != truth), np.mean(np.bincount(y).argmax() != truth)
-        if kind == "regression" and np.array_equal(given, np.round(given)):
-            fail("predict", "its answers are whole numbers, and the targets are not")
-        if not error < BETTER * bar:
-            fail("predict", f"{kind}: its error is {error:.3g}, that of the trivial answer {bar:.3g}")
+            given = given > np.median(given)
+        error, bar = (float(np.abs(one - truth).mean()) for one in (given, np.median(y)))
+        if not error < BETTER * bar or (kind == "regression" and np.array_equal(given, np.round(given))):
+            text = f"{kind}: its error is {error:.3g}, that of the trivial answer {bar:.3g}, or it rounds"
+            fail("predict", text)

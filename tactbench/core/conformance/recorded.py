@@ -1,9 +1,13 @@
-"""Checks of a recording of a sensor; no code of the plugin runs."""
+"""Checks of recordings: of one of a sensor, and of those that a data set's mapping makes. No code of a plugin runs."""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping
 from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -17,14 +21,20 @@ from tactbench.core.conformance.streams import (
     read_back,
     within_limits,
 )
+from tactbench.core.recording.datasets import DataSet, copy_in
+from tactbench.core.recording.mapping import model
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
-LARGEST_N, MOST_N = 1000.0, 100.0  # at most, and in the median: a press of 10 N in gram-force reads 1020
-LOADED = 0.2  # share of the largest force
-FAR, FAR_IN_RANGE = 1.0, 0.25  # spans of readings, and shares of the range, by which a stated rest may lie off them
-CLEAR = 0.5  # correlation of a taxel with the force from which on its sign can be told
+LARGEST_N, MOST_N = 1000.0, 100.0  # largest and median force: a press of 10 N in gram-force reads 1020
+LOADED = 0.2  # share of the largest force from which a sample counts as loaded
+FAR, FAR_IN_RANGE = 1.0, 0.25  # largest distance of a stated rest from the readings, in their spans and in the range
+CLEAR = 0.5  # correlation of a taxel with the force that determines its sign
+MOST_READ = 40  # recordings that are looked at, evenly over all
+LONE, LONE_SHARE = 2.0, 0.02  # a sentinel stands so many ranges apart from all others, in such a share of rows
 
 
 @lru_cache(maxsize=2)
@@ -45,11 +55,9 @@ def recording_fits_the_spec(subject: Subject) -> None:
     """
     meta, data, wrong = _read(subject)
     spec = subject.registry.sensors[subject.name].spec
-    if meta.sensor.name != spec.name:
-        fail("meta.sensor.name", f"it is of {meta.sensor.name!r}")
-    strange = {one.name for one in meta.sensor.channels()} - {one.name for one in spec.channels()}
-    if strange:
-        fail("meta.sensor.streams", f"the sensor has no channel {min(strange)}")
+    unknown = {one.name for one in meta.sensor.channels()} - {one.name for one in spec.channels()}
+    if meta.sensor.name != spec.name or unknown:
+        fail("meta.sensor", f"it is of {meta.sensor.name!r}, with unknown channels: {', '.join(sorted(unknown))}")
     if wrong:
         fail("file", wrong)
     fits(meta, data, spec)
@@ -72,25 +80,25 @@ def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) 
         stream, limits = data[stated.name], {one.name: one for one in stated.channels}
         own_rate = stated.name in meta.own_rates_hz or (meta.simulated and meta.emulation is None)
         rate_is_right(f"spec.streams[{stated.name}]", stream, None if own_rate else stated.rate_hz)
-        for column, channel in enumerate(stream.spec.channels):
-            own, values = limits[channel.name], good(stream)[:, column]
-            where = f"spec.streams[{stated.name}].channels[{channel.name}]"
+        load = np.full(len(stream.data), np.nan)
+        if stream.t_ns is not None and pressing is not None and pressing.t_ns is not None:
+            load = np.interp(stream.t_ns, pressing.t_ns, force_n)
+        for channel, values in zip(stream.spec.channels, good(stream).T, strict=True):
+            own, where = limits[channel.name], f"spec.streams[{stated.name}].channels[{channel.name}]"
             within_limits(where, own, values)
             there = values[np.isfinite(values)]
             if own.rest is not None and len(there):
                 rest, low, high = own.rest.to(own.unit), there.min(), there.max()
-                apart = max(low - rest, rest - high)
                 ends = [one for one in limits_of(own) if np.isfinite(one)]
-                if apart > max(FAR * (high - low), FAR_IN_RANGE * (np.ptp(ends) if ends else 0.0)):
+                near = max(FAR * (high - low), FAR_IN_RANGE * (np.ptp(ends) if ends else 0.0))
+                if not low - near <= rest <= high + near:
                     fail(f"{where}.rest", f"{rest:g} is stated, and it reads {low:g} to {high:g}")
-            if channel.kind != "taxel" or stream.t_ns is None or pressing is None or pressing.t_ns is None:
-                continue
-            felt = np.interp(stream.t_ns, pressing.t_ns, force_n)
-            whole = np.isfinite(values) & np.isfinite(felt)
-            if whole.any() and np.ptp(values[whole]) > 0 and np.ptp(felt[whole]) > 0:
-                likeness = float(np.corrcoef(values[whole], felt[whole])[0, 1])
-                if likeness * own.sign < -CLEAR:
-                    fail(f"{where}.sign", f"{own.sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
+            whole = np.isfinite(values) & np.isfinite(load)
+            if channel.kind == "taxel" and np.unique(values[whole]).size > 1 and np.unique(load[whole]).size > 1:
+                correlation = float(np.corrcoef(values[whole], load[whole])[0, 1])
+                if correlation * own.sign < -CLEAR:
+                    text = f"{own.sign:+d} is stated, its correlation with the force is {correlation:+.2f}"
+                    fail(f"{where}.sign", text)
 
 
 @check("sensor", mode="recording", needs="recording-fits-the-spec")
@@ -101,3 +109,77 @@ def recording_is_of_a_real_unit(subject: Subject) -> None:
     """
     if _read(subject).meta.simulated:
         skip("it is simulated, or its devices are emulated")
+
+
+def _mapping(subject: Subject) -> model.Mapping:
+    with code_of(subject.module, subject):
+        return DataSet(Path(subject.module)).mapping
+
+
+@check("dataset")
+def tasks_can_be_answered(subject: Subject) -> None:
+    """A task is looked up, and what it asks for, when everything has been fetched and imported.
+
+    Name tasks of `tactbench list tasks`, or of the mapping, under `source.tasks`: the mapping must have their target
+    and features. A session is what was recorded without mounting anew, and holds several trials.
+    """
+    mapping = _mapping(subject)
+    streams = mapping.streams.values()
+    sensed = {channel.kind for one in streams if one.of == "sensor" for channel in one.channels}
+    known = {channel.kind for one in streams if one.of == "reference" for channel in one.channels}
+    labels = {*mapping.recording.labels, *(label for one in streams for label in one.annotations)}
+    own = {one.name: one.spec for one in mapping.tasks}
+    for name in () if mapping.source is None else mapping.source.tasks:
+        with code_of("source.tasks", subject):
+            spec: TaskSpec = own[name] if name in own else subject.registry.tasks[name].spec
+        target = spec.target
+        there: set[str] = {*known, *(sensed if isinstance(target, VectorTarget) else ())}
+        asked = getattr(target, "kind", None)
+        if isinstance(target, LabelTarget):
+            asked, there = target.name, labels
+        if not sensed & {*spec.features, *spec.optional_features} or (asked is not None and asked not in there):
+            text = f"{name} predicts {asked} from {' or '.join(spec.features)}"
+            fail("source.tasks", f"{text}; there is {', '.join(sorted(there)) or 'none'} beside {', '.join(sensed)}")
+    names = mapping.recording.session, mapping.recording.trial
+    session, trial = (set(re.findall(r"\{(\w+)", name)) for name in names)
+    if trial and trial <= session:
+        fail("recording.session", "each trial is a session of its own: a split by session holds out single trials")
+
+
+@check("dataset", needs="tasks-can-be-answered")
+def readings_are_as_stated(subject: Subject) -> None:
+    """What a mapping states wrongly is stored, and believed by everybody who reads the recordings.
+
+    Look at columns, units (`given_in`), sentinels, `sign`, `lower`, `upper`, `rest` and `rate_hz` of the channels that
+    are named, and at the unit of the time.
+    """
+    mapping, file = _mapping(subject), Path(subject.module)
+    first = "" if mapping.source is None else next(iter(mapping.source.files))
+    folders = (copy_in(subject.root, first), DataSet(file).files, file.parent)
+    root = next((one for one in folders if one is not None and first and (one / first).is_file()), None)
+    if first and root is None:
+        skip("its files are not here, and none is fetched: `--root DIR` names a folder that holds a copy")
+    roles: Counter[str | None] = Counter()
+    with TemporaryDirectory() as folder:
+        with code_of(subject.module, subject):
+            report = import_tables(file, root=root or subject.root, out=Path(folder))
+        for imported in report.recordings[:: max(1, len(report.recordings) // MOST_READ)]:
+            made = read_back(imported.path)
+            roles[made.meta.role] += 1
+            leaks = [one.message for one in imported.findings if one.check == "target-among-features"]
+            if made.wrong or leaks:
+                fail(imported.meta.name, "; ".join((made.wrong, *leaks)))
+            fits(made.meta, made.came, made.meta.sensor)
+            for name, stream in made.came.items():
+                for channel, column in zip(stream.spec.channels, good(stream).T, strict=True):
+                    values = column[np.isfinite(column)]
+                    if channel.kind not in ("force", "torque") or len(values) < 1 / LONE_SHARE:
+                        continue
+                    low, high = np.quantile(values, (LONE_SHARE, 1 - LONE_SHARE))
+                    apart = np.unique(values[np.abs(values - (low + high) / 2) > (LONE + 0.5) * (high - low)])
+                    if len(apart) == 1 and high > low:
+                        text = f"{apart[0]:g} {channel.unit} in {imported.meta.name} is far from all others: no sample?"
+                        fail(f"streams.{name}.channels[{channel.name}].sentinels", text)
+    lacking = [one for one in ("train", "test") if set(roles) != {None} and one not in roles]
+    if lacking:
+        fail("recording.role", f"no recording has the role {lacking[0]}")

@@ -1,4 +1,4 @@
-"""Running checks: each in a child process that may hang or crash, and what came of them all."""
+"""Running of checks in a child process, which may hang or crash, and the report of their outcomes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import time
 from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
@@ -15,7 +16,6 @@ from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their ch
     task,
     estimator,
     recorded,
-    data_set,
 )
 from tactbench.core.conformance.check import (
     CHECKS,
@@ -27,7 +27,8 @@ from tactbench.core.conformance.check import (
     Kind,
     Mode,
     Subject,
-    line_in,
+    code_of,
+    skip,
     unchanged,
 )
 from tactbench.core.errors import TimedOut, UnknownNameError, error_text
@@ -51,7 +52,7 @@ def checks_of(kind: Kind, *modes: Mode) -> tuple[Check, ...]:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What came of the checks of one plugin."""
+    """Outcomes of the checks of one plugin."""
 
     kind: Kind
     name: str
@@ -74,7 +75,7 @@ class CheckReport:
 
     @property
     def level(self) -> str | None:
-        """How much was shown; None: something failed, or only a recording was read."""
+        """Level that the passed checks give; None if a check failed, or only a recording was read."""
         passed = {one.check for one in self.of("passed")}
         if "passive" not in self.modes or self.failed or not passed:
             return None
@@ -84,7 +85,7 @@ class CheckReport:
 
     @property
     def summary(self) -> str:
-        """How many checks ran, and what came of them, in one line."""
+        """Numbers of checks by status, in one line."""
         counts = ", ".join(f"{status} {len(self.of(status))}" for status in ("passed", "failed", "skipped"))
         return f"{self.kind} {self.name}: {counts}.{f' Level: {self.level}.' if self.level else ''}"
 
@@ -93,27 +94,27 @@ class CheckReport:
 
 
 def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
-    """Return what is called `name`: descriptors of that name, or else all that a plugin of that name brings.
+    """Return the descriptors called `name`, or else all that a plugin of that name brings.
 
     Raises
     ------
     UnknownNameError
-        If nothing is called so, and no plugin that failed to load.
+        If there is none, and no plugin of that name that failed to load.
     """
-    families, rows = registry.families(), plugins_named(registry, name)
-    every = [(kind, one) for kind in kinds if kind != "dataset" for one in families[f"{kind}s"].names()]
+    rows = plugins_named(registry, name)
+    every = [(kind, one) for kind in kinds if kind != "dataset" for one in registry.families()[f"{kind}s"].all_owned()]
     brought = {one for row in rows for one in row.brings}
     mapping = mapping_called(name) if "dataset" in kinds else None
     files = [mapping] if mapping else [file for row in rows if not row.brings for file in mappings_of(row.module)]
-    data_sets = [Subject("dataset", file.stem, str(file), "", registry) for file in files]
-    found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
-    if not found and not data_sets and not any(row.status == "failed" for row in rows):
-        raise UnknownNameError(
-            "plugin", name, {one for _, one in every} | {row.entry_point for row in registry.plugins}
-        )
-    owned = [(kind, one, families[f"{kind}s"].owned(one)) for kind, one in found]
-    plain = [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
-    return plain + data_sets
+    found = [(kind, one) for kind, one in every if one.descriptor.name == name] or [
+        (kind, one) for kind, one in every if f"{kind} {one.descriptor.name}" in brought
+    ]
+    if not found and not files and not any(row.status == "failed" for row in rows):
+        known = {one.descriptor.name for _, one in every} | {row.entry_point for row in registry.plugins}
+        raise UnknownNameError("plugin", name, known)
+    return [Subject(kind, one.descriptor.name, one.module, one.distribution, registry) for kind, one in found] + [
+        Subject("dataset", file.stem, str(file), "", registry) for file in files
+    ]
 
 
 def plugins_named(registry: Registry, name: str) -> list[PluginRow]:
@@ -142,12 +143,12 @@ def run_checks(
     Parameters
     ----------
     modes
-        Which checks. Where only a recording is read, the plugin's code is not imported.
+        Modes of the checks. In the mode `recording` the plugin's code is not imported.
     recording, rig_file, operator, root
         As :class:`Subject` has them.
     isolated
-        Whether in a child process. Checks of the mode `invasive` are always run in this one, and without a limit of
-        time: an interrupt must reach the rig.
+        Whether in a child process. Checks of the mode `invasive` are always run in this process, without a time limit:
+        an interrupt must reach the rig.
     without
         Names of checks that are left out.
     """
@@ -156,7 +157,7 @@ def run_checks(
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
-        for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
+        for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
                 late = isinstance(given, TimedOut)
                 text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
@@ -165,37 +166,24 @@ def run_checks(
             outcomes[name] = given
     for one in checks:
         if one.mode == "invasive":
-            _Trier(subject, outcomes)(one.name)
+            outcomes[one.name] = _tried(subject, outcomes, one.name)
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
 
 
-@dataclass
-class _Trier:
-    """Tries checks by name in one process, one after the other, and keeps what came of them."""
-
-    subject: Subject
-    outcomes: dict[str, CheckOutcome]
-
-    def __call__(self, name: str) -> CheckOutcome:
-        return self.outcomes.setdefault(name, self._tried(name))
-
-    def _tried(self, name: str) -> CheckOutcome:
-        (one,) = [one for one in CHECKS if one.name == name]
-        for before in filter(None, map(self.outcomes.get, one.needs)):
+def _tried(subject: Subject, outcomes: dict[str, CheckOutcome], name: str) -> CheckOutcome:
+    """Run a check unless one that it needs has not passed; its outcome is added to `outcomes`."""
+    (one,) = [one for one in CHECKS if one.name == name]
+    began_s, outcome = time.perf_counter(), CheckOutcome(name, "passed")
+    try:
+        for before in filter(None, map(outcomes.get, one.needs)):
             if before.status != "passed":
-                text = before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed"
-                return CheckOutcome(name, "skipped", "", text)
-        began_s = time.perf_counter()
-        try:
-            with unchanged(self.subject) if one.mode == "passive" else nullcontext():
-                one.run(self.subject)
-            outcome = CheckOutcome(name, "passed")
-        except CheckFailed as failure:
-            advice = "" if failure.__cause__ is not None else one.cure
-            outcome = CheckOutcome(name, "failed", failure.where, failure.text, advice)
-        except CheckSkipped as reason:
-            outcome = CheckOutcome(name, "skipped", "", str(reason))
-        except (Exception, SystemExit) as error:
-            line = line_in(self.subject.package, error.__traceback__) or self.subject.module
-            outcome = CheckOutcome(name, "failed", line, error_text(error))
-        return outcome._replace(seconds=round(time.perf_counter() - began_s, 3))
+                skip(before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed")
+        with unchanged(subject) if one.mode == "passive" else nullcontext(), code_of(subject.module, subject):
+            one.run(subject)
+    except CheckFailed as failure:
+        advice = "" if failure.__cause__ is not None else one.cure
+        outcome = CheckOutcome(name, "failed", failure.where, failure.text, advice)
+    except CheckSkipped as reason:
+        outcome = CheckOutcome(name, "skipped", "", str(reason))
+    outcomes[name] = outcome._replace(seconds=round(time.perf_counter() - began_s, 3))
+    return outcomes[name]

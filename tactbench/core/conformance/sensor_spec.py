@@ -13,7 +13,7 @@ from tactbench.core.spec import units
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec, Vector
 from tactbench.core.spec.skin import BondedLayer, FoamPad, SkinSheet
 
-LARGEST_M = 0.5  # farthest distance of the outermost taxels: the skin of a forearm is 0.3 m long
+LARGEST_MM = 250.0  # distance of the outermost taxels from the origin: the skin of a forearm is 0.3 m long
 OF_KIND = {
     "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa", "dc_temperature": "K",
     "joint": "rad",
@@ -22,16 +22,15 @@ OF_KIND = {
 RAW = ("count", "V", "mV")
 FASTEST_HZ, SLOWEST_HZ = 1e6, 0.1
 SOONEST_S, LATEST_S = 20e-6, 0.25  # of a link's delay (assumed: an SPI word takes microseconds, a radio link 0.1 s)
-SPREAD, FEW = 0.2, 3  # share of the skin's longer side that taxels reach over, and places from which that is told
+SPREAD, FEW = 0.2, 3  # smallest extent of three or more taxels, of the skin's longer side
 PRESS_N, PRESS_MM, LEAST_MM = 1.0, 2.5, 1e-3  # a press of a flat punch of this radius, and by what it indents a skin
 EDGE_MM, UNIT_NORMAL = 1e-6, 1e-3  # rounding of a position in metres; data sheets state normals to three decimals
-INWARD = -0.5  # cosine between a stated normal and the sheet's own, below which it points into the sensor
 
 
-def on_sheet_mm(sheet: SkinSheet, position_m: Vector) -> tuple[float, float]:
+def on_sheet_mm(sheet: SkinSheet | None, position_m: Vector) -> tuple[float, float]:
     """Return the axial coordinate and the arc length at which a place of the sensor's frame lies on the sheet [mm]."""
     x_mm, y_mm, z_mm = (1e3 * part for part in position_m)
-    if sheet.outer_radius is None:
+    if sheet is None or sheet.outer_radius is None:
         return x_mm, y_mm
     return x_mm, sheet.outer_radius.to("mm") * math.atan2(y_mm, -z_mm)
 
@@ -53,8 +52,8 @@ def limits_are_in_order(subject: Subject) -> None:
     for rated in subject.spec.streams:
         rate_hz = rated.rate_hz
         if rate_hz is not None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-            period = f"; is it a period? One of {rate_hz:g} s is {1 / rate_hz:g} Hz" if rate_hz < 1 else ""
-            fail(f"spec.streams[{rated.name}].rate_hz", f"{rate_hz:g} Hz{period}")
+            text = f"{rate_hz:g} Hz is not within {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz: is it a period?"
+            fail(f"spec.streams[{rated.name}].rate_hz", text)
     delay, slowest_hz = subject.spec.link_delay, min(one.rate_hz or 100.0 for one in subject.spec.streams)
     latest_s = max(LATEST_S, 2 / slowest_hz)
     if delay is not None and delay.to("s") != 0 and not SOONEST_S <= delay.to("s") <= latest_s:
@@ -69,7 +68,7 @@ def limits_are_in_order(subject: Subject) -> None:
             text = f"{low:g} to {high:g}: the converter's ends are needed, and must fit {stream.dtype}"
             fail(f"{place}.lower, upper", text)
         rest = low if channel.rest is None else channel.rest.to(channel.unit)
-        if rest < low or rest > high:
+        if not low <= rest <= high:
             fail(f"{place}.rest", f"{rest:g} {channel.unit} is not within lower and upper, {low:g} to {high:g}")
 
 
@@ -78,47 +77,34 @@ def places_are_on_the_skin(subject: Subject) -> None:
     """Millimetres make a fingertip the size of a room; a taxel off the skin's sheet, or there twice, is a copied line.
 
     Convert position_m: 1 mm is 0.001, 1 inch 0.0254. Name the `site` that taxels share, and move them within the sheet:
-    x from x_min to x_max, along the arc within half its width. State as normal the unit vector that leaves the skin.
+    x from x_min to x_max, along the arc within half its width. State a unit vector as normal.
     """
     placed = [(place, one, one.position_m) for place, _, one in _channels(subject) if one.position_m is not None]
     if not placed:
         skip("it states no place of any channel")
-    sheet = None if subject.spec.skin is None else subject.spec.skin.sheet
-    low, high, half = (-math.inf, math.inf, math.inf)
-    if sheet is not None:
+    low, high, half, sheet = -LARGEST_MM, LARGEST_MM, LARGEST_MM, None
+    if subject.spec.skin is not None:
+        sheet = subject.spec.skin.sheet
         low, high, half = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm") / 2
-    size_m = min(1e-3 * max(abs(low), abs(high), half), LARGEST_M / 2)
-    place, _, position_m = max(placed, key=lambda one: max(map(abs, one[2])))
-    far_m = max(map(abs, position_m))
-    if far_m > 2 * size_m:
-        unit = "millimetres" if sheet is None or far_m > 200 * size_m else "inches"
-        text = f"{far_m:g} m from the origin of a sensor that reaches {1e3 * size_m:.3g} mm: are these {unit}?"
-        fail(f"{place}.position_m", text)
-    spots = np.array(sorted({one for _, channel, one in placed if channel.kind == "taxel"}))
-    if sheet is not None and len(spots) >= FEW:
-        ends = np.array([on_sheet_mm(sheet, tuple(one)) for one in spots])
-        spread, side = float(np.ptp(ends, axis=0).max()), max(high - low, 2 * half)
-        if spread < SPREAD * side:
-            fail("spec.streams.channels.position_m", f"taxels lie within {spread:.3g} mm of a skin of {side:g} mm")
     places: dict[Vector, tuple[str, str]] = {}
-    ahead = None
+    spots = []
     for place, channel, position_m in placed:
-        first, known = places.setdefault(position_m, (channel.name, channel.site or place))
-        if channel.kind == "taxel" and known != (channel.site or place):
-            fail(f"{place}.position_m", f"it is also that of {first}")
-        x_mm, s_mm = (0.0, 0.0) if sheet is None else on_sheet_mm(sheet, position_m)
-        if channel.kind == "taxel" and not (low - EDGE_MM <= x_mm <= high + EDGE_MM and abs(s_mm) <= half + EDGE_MM):
-            text = f"x {x_mm:.3g} mm, along the arc {s_mm:.3g} mm is off the sheet"
-            fail(f"{place}.position_m", f"{text} (x {low:g} to {high:g} mm, arc {-half:g} to {half:g} mm)")
-        if channel.normal is None:
+        if channel.normal is not None and not abs(math.hypot(*channel.normal) - 1.0) <= UNIT_NORMAL:
+            fail(f"{place}.normal", f"its length is {math.hypot(*channel.normal):.4g}, not 1")
+        if channel.kind != "taxel":
             continue
-        length = math.hypot(*channel.normal)
-        if not abs(length - 1.0) <= UNIT_NORMAL:
-            fail(f"{place}.normal", f"its length is {length:.4g}, not 1")
-        ahead = ahead or channel.normal
-        _, y, z = position_m if sheet is not None and sheet.outer_radius is not None else ahead
-        if y * channel.normal[1] + z * channel.normal[2] < INWARD * math.hypot(y, z):
-            fail(f"{place}.normal", "it points into the finger, or to the other side of the pad than the first one")
+        x_mm, s_mm = on_sheet_mm(sheet, position_m)
+        spots.append((x_mm, s_mm))
+        if not (low - EDGE_MM <= x_mm <= high + EDGE_MM and abs(s_mm) <= half + EDGE_MM):
+            text = f"x {x_mm:.3g} mm, along the arc {s_mm:.3g} mm is off the sheet"
+            fail(f"{place}.position_m", f"{text} (x {low:g} to {high:g} mm, arc {-half:g} to {half:g} mm): is it in m?")
+        first, site = places.setdefault(position_m, (channel.name, channel.site or place))
+        if site != (channel.site or place):
+            fail(f"{place}.position_m", f"it is also that of {first}")
+    side_mm = max(high - low, 2 * half)
+    if sheet is not None and len(places) >= FEW and np.ptp(spots, axis=0).max() < SPREAD * side_mm:
+        text = f"taxels lie within {np.ptp(spots, axis=0).max():.3g} mm of a skin of {side_mm:g} mm"
+        fail("spec.streams.channels.position_m", text)
 
 
 @check("sensor")
@@ -149,16 +135,16 @@ def nuisances_are_in_its_units(subject: Subject) -> None:
     spec = subject.spec
     if not spec.nuisances:
         skip("it states no nuisances")
+    device = spec.data_sheet.exists or any(np.dtype(one.dtype).kind in "iu" for one in spec.streams)
     for kind, nuisances in spec.nuisances.items():
-        if not spec.channels(kind):
-            kinds = sorted({channel.kind for channel in spec.channels()})
-            fail(f"spec.nuisances[{kind}]", f"it has no {kind} channel; it has {', '.join(kinds)}")
-        device = spec.data_sheet.exists or any(np.dtype(one.dtype).kind in "iu" for one in spec.streams)
+        where, channels = f"spec.nuisances[{kind}]", spec.channels(kind)
+        if not channels:
+            fail(where, f"it has no {kind} channel; it has {', '.join({one.kind for one in spec.channels()})}")
         if device and nuisances.white.value == nuisances.step.value == 0:
-            fail(f"spec.nuisances[{kind}]", "white and step are both 0: every reading is exact; state one of them")
+            fail(where, "white and step are both 0: every reading is exact; state one of them")
         for field in nuisances.model_fields_set - {"creep"}:
             amount = getattr(nuisances, field)
             share = field.endswith("_scatter") or field in ("unit_gain", "offset_smooth")
-            unit = "1" if share else spec.channels(kind)[0].unit
+            unit = "1" if share else channels[0].unit
             if amount is not None and not field.endswith("_tau") and amount.unit != unit:
-                fail(f"spec.nuisances[{kind}].{field}", f"its unit is {amount.unit!r}, and {unit!r} is needed")
+                fail(f"{where}.{field}", f"its unit is {amount.unit!r}, and {unit!r} is needed")

@@ -1,4 +1,4 @@
-"""What came of streams, from a rig, a driver or a file, looked at for what would spoil a recording."""
+"""Recorded streams of a rig, a driver or a file, and comparisons that several checks make of them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from tactbench.core.conformance.check import fail
 from tactbench.core.plugins.interfaces import RecordingRequest
-from tactbench.core.samples import COLUMNS, Block, FloatArray, Quality, StreamData, join_blocks
+from tactbench.core.samples import Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
@@ -23,11 +24,11 @@ from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 BAD = Quality.MISSING | Quality.SUSPECT
-RATE_SHARE, LEAST_ROWS = 0.02, 20  # a rate further off is a mistake (assumed: quartz is far better); rows that tell
-OFF_S = 1.0  # how late the last row's time may be: of a device that sends once a second
-FORCE_SHARE = 0.2  # by which a force at the end of a press may differ: newtons and gram-force differ a hundred times
-UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}
-UNITS_OF_FORCE = {102.0: "gram-force", 1000.0: "millinewtons"}  # by what a reading in newtons is multiplied
+RATE_SHARE, LEAST_ROWS = 0.02, 20  # tolerance of a rate (assumed: quartz is far better), and rows that determine it
+OFF_S = 1.0  # largest delay of the last row's time: of a device that sends once a second
+FORCE_SHARE = 0.2  # tolerance of the force at the end of a press: newtons and gram-force differ a hundred times
+UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}  # factors on nanoseconds
+UNITS_OF_FORCE = {102.0: "gram-force", 1000.0: "millinewtons"}  # factors on newtons
 
 
 class Recorded(NamedTuple):
@@ -37,7 +38,18 @@ class Recorded(NamedTuple):
     came: Mapping[str, StreamData]
     """By stream."""
     wrong: str
-    """The worst that `tactbench inspect` says of it; empty: nothing that ends an evaluation."""
+    """First error that `tactbench inspect` reports; empty if there is none."""
+
+    @property
+    def arrays(self) -> dict[str, list[Any]]:
+        """Samples by stream, for `differing`."""
+        return {name: [stream.data] for name, stream in self.came.items()}
+
+
+def differing(one: Mapping[str, Sequence[Any]], other: Mapping[str, Sequence[Any]]) -> list[str]:
+    """Return the names under which two runs gave other arrays; NaN equals NaN."""
+    same = partial(np.array_equal, equal_nan=True)
+    return [name for name in one if not all(map(same, one[name], other[name]))]
 
 
 def read_back(path: Path) -> Recorded:
@@ -73,7 +85,7 @@ def carried_out(
 
 
 def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> dict[str, StreamData]:
-    """Return what came of each stream, NaN where it means nothing; fail where blocks are not as blocks must be."""
+    """Return the data of each stream; fail where a block is not one of the streams or its columns do not fit."""
     came: dict[str, list[Block]] = {spec.name: [] for spec in streams}
     for block in blocks:
         if block.stream not in came:
@@ -82,14 +94,9 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
     found = {}
     for spec in streams:
         nothing = np.empty((0, len(spec.channels)))
-        parts = came[spec.name] or [Block(spec.name, None, nothing, nothing.astype(np.uint8))]
-        try:
-            whole = join_blocks(parts)
-        except ValueError as error:
-            fail(f"{where}: {spec.name}", f"its blocks do not fit each other: {error}")
-        shapes = {name: column.shape for name in COLUMNS if (column := getattr(whole, name)) is not None}
-        if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
-            fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
+        whole = join_blocks(came[spec.name] or [Block(spec.name, None, nothing, nothing.astype(np.uint8))])
+        if {whole.data.shape, marks_of(whole).shape} != {(len(whole.data), len(spec.channels))}:
+            fail(f"{where}: {spec.name}", f"its data are {whole.data.shape}, for {len(spec.channels)} channels")
         found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence,
                                       device_ns=whole.device_ns)  # fmt: skip
         are_finite(where, found[spec.name])
@@ -97,37 +104,33 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
 
 
 def are_finite(where: str, stream: StreamData) -> None:
-    """Fail where a sample is no number, and not marked so."""
-    wrong = np.argwhere(~np.isfinite(stream.data) & ((marks_of(stream) & BAD) == 0))
-    if len(wrong):
-        channel = stream.spec.channels[wrong[0][1]].name
-        fail(f"{where}: {stream.spec.name}.{channel}", "it is not finite, and not marked as MISSING")
+    """Fail where a sample is not finite, and not marked so."""
+    if (~np.isfinite(stream.data) & ((marks_of(stream) & BAD) == 0)).any():
+        fail(f"{where}: {stream.spec.name}", "a sample is not finite, and not marked as MISSING")
 
 
 def marks_of(stream: StreamData | Block) -> npt.NDArray[np.uint8]:
-    """Return the (n, channels) marks; what has none is good."""
+    """Return the (n, channels) quality; all good where none is stored."""
     return np.zeros(np.shape(stream.data), np.uint8) if stream.quality is None else stream.quality
 
 
 def good(stream: StreamData | Block) -> FloatArray:
-    """Return the (n, channels) samples, NaN where they mean nothing."""
+    """Return the (n, channels) samples, NaN where their quality is bad."""
     return np.where(marks_of(stream) & BAD, np.nan, stream.data.astype(np.float64))
 
 
 def times_are_right(where: str, stream: StreamData, seconds: float, late: float, ended_ns: int | None = None) -> None:
-    """Fail where times are not nanoseconds that go on, over `seconds` but for a share of `late`, at the stated rate.
+    """Fail where times are no ascending int64 nanoseconds, at the stated rate, over `seconds` up to a share of `late`.
 
-    `ended_ns` is what the host's clock says when the last row has come; None: there is none.
+    `ended_ns` is the time of the host's clock when the last row was read, if there is one.
     """
     t_ns = stream.t_ns
     if t_ns is None or len(t_ns) < 2:
         return
     spans = float(t_ns[-1] - t_ns[0]) * 1e-9
-    for factor, unit in UNITS_OF_TIME.items():
-        if 0.5 < spans / seconds / factor < 2:
-            fail(f"{where}.t_ns", f"it is in {unit}, and nanoseconds are needed")
-    if t_ns.dtype.kind != "i":
-        fail(f"{where}.t_ns", f"it is {t_ns.dtype}, and int64 is needed")
+    units = [unit for factor, unit in UNITS_OF_TIME.items() if 0.5 < spans / seconds / factor < 2]
+    if units or t_ns.dtype.kind != "i":
+        fail(f"{where}.t_ns", f"it is in {units[0] if units else t_ns.dtype}, and int64 nanoseconds are needed")
     if (np.diff(t_ns) < 0).any():
         fail(f"{where}.t_ns", "it goes back")
     off_s = 0.0 if ended_ns is None else (float(t_ns[-1]) - ended_ns) * 1e-9
@@ -140,7 +143,7 @@ def times_are_right(where: str, stream: StreamData, seconds: float, late: float,
 
 
 def rate_is_right(where: str, stream: StreamData, rate_hz: float | None) -> None:
-    """Fail where times say another rate than the stated one."""
+    """Fail where the rate of the times is not the stated one."""
     if rate_hz is None or stream.t_ns is None or len(stream.t_ns) < LEAST_ROWS:
         return
     found_hz = (len(stream.t_ns) - 1) / (float(stream.t_ns[-1] - stream.t_ns[0]) * 1e-9)
@@ -163,24 +166,22 @@ def within_limits(where: str, channel: ChannelSpec, values: FloatArray) -> None:
 
 
 def pressing_force(came: Mapping[str, StreamData], streams: Sequence[StreamSpec]) -> tuple[StreamData, FloatArray]:
-    """Return the stream and the readings of the pressing force among some streams; fail if there is none in newtons."""
-    known = ((spec, column, one) for spec in streams for column, one in enumerate(spec.channels))
-    found = [one for one in known if one[2].kind == "force" and one[2].name in ("fz", "normal")]
+    """Return the stream and the readings of the pressing force among `streams`; fail if there is none in newtons."""
+    found = [(spec.name, column) for spec in streams for column, one in enumerate(spec.channels)
+             if one.kind == "force" and one.name in ("fz", "normal") and one.unit == "N"]  # fmt: skip
     if not found:
-        fail("reference", "it has no channel of kind force called fz or normal")
-    spec, column, channel = found[0]
-    if channel.unit != "N":
-        fail(f"reference: {spec.name}.{channel.name}.unit", f"{channel.unit!r}, and 'N' is needed")
-    return came[spec.name], good(came[spec.name])[:, column]
+        fail("reference", "it has no channel of kind force called fz or normal, with the unit N")
+    name, column = found[0]
+    return came[name], good(came[name])[:, column]
 
 
 def force_is(where: str, found_n: float, meant_n: float) -> None:
-    """Fail where a force at the end of a press is another one, and say which mistake makes it so."""
+    """Fail where the force at the end of a press is not the commanded one."""
     if abs(found_n - meant_n) > FORCE_SHARE * meant_n:
         fail(where, f"{found_n:.4g} N at the end of a press to {meant_n:g} N{likely(found_n / meant_n)}")
 
 
 def likely(factor: float) -> str:
-    """Return which mistake makes a force larger by a factor, as a question; empty: none that is known."""
+    """Return the likely cause of a factor on a force as a question, or an empty text."""
     units = [unit for other, unit in UNITS_OF_FORCE.items() if 0.8 < factor / other < 1.25]
     return f": are these {units[0]}?" if units else ": is its sign turned?" if factor < 0 else ""

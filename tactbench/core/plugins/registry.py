@@ -213,7 +213,8 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
         offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
-        reason = f"{reason or f'{type(error).__name__}: {error}'}{_line_in(point.module, error)}"
+        line = line_in(point.module, getattr(error, "traceback_text", ""))
+        reason = f"{reason or f'{type(error).__name__}: {error}'}{line}"
         registry.plugins.append(PluginRow(point.name, point.value, *owner, "failed", (), reason))
         return
     for family, descriptors in offered.items():
@@ -223,10 +224,10 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     registry.plugins.append(PluginRow(point.name, point.value, *owner, "loaded", brings))
 
 
-def _line_in(module: str, error: Exception) -> str:
-    """Return `` (file, line N)`` of the innermost line in a plugin's own package; empty if there is none."""
-    package, text = re.escape(module.partition(".")[0]), getattr(error, "traceback_text", "")
-    own = re.findall(rf'File "[^"]*/({package}[/.][^"]*)", line (\d+)', text)
+def line_in(module: str, trace: str) -> str:
+    """Return `` (file, line N)`` of the innermost line of a trace in a plugin's own package; empty if there is none."""
+    package = re.escape(module.partition(".")[0])
+    own = re.findall(rf'File "[^"]*/({package}[/.][^"]*)", line (\d+)', trace)
     return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 

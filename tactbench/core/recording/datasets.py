@@ -100,7 +100,7 @@ class DataSet:
         MappingError, UnwritableError
             As :func:`~tactbench.core.recording.mapping.importing.import_tables` raises them.
         """
-        target, copy = self.imported, _copy(root, next(iter(self.source.files)))
+        target, copy = self.imported, copy_in(root, next(iter(self.source.files)))
         if target.is_dir():
             return target
         progress = progress or Progress()
@@ -210,7 +210,7 @@ def _folders() -> dict[str, Path]:
     return found
 
 
-def _copy(root: Path | None, first: str) -> Path | None:
+def copy_in(root: Path | None, first: str) -> Path | None:
     """Return `root` or the sub-folder of it that holds the first file; None if none does."""
     if root is None:
         return None
