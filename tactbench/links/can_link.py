@@ -19,14 +19,18 @@ from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, ca
 
 WAITED_S = 60.0
 """Longest wait of a frame in a kernel's queue (assumed): an older stamp is not used."""
-AT_ONCE_NS = 5_000_000
-"""Longest time from the receipt of a frame by the kernel to that by a waiting reader, in the median (assumed)."""
-_SLCAN = re.compile(
-    "|".join(
-        [*(rf"(t[\dA-Fa-f]{{3}}|[Tx][\dA-Fa-f]{{8}}){n}([\dA-Fa-f]{{2}}){{{n}}}([\dA-Fa-f]{{4}})?" for n in range(9))]
-    )
-    + r"|(r[\dA-Fa-f]{3}|R[\dA-Fa-f]{8})[0-8]"
-)
+SYSTEMS_OWN_NS = 5_000_000
+"""Largest lag of stamps that are the system clock's own, and largest scatter of stamps that are used (assumed: a
+wake-up takes less)."""
+LEAST_OF = 200
+"""Frames of which at least one is read at once, where the reader waited for none (assumed)."""
+WINDOW_NS = 5_000_000_000
+"""Length of a window; the least age is that of the current and the previous one (assumed: 1 ms at 100 ppm)."""
+_HEX = r"[\dA-Fa-f]"
+_SLCAN = re.compile("|".join([
+    *(rf"(?:t{_HEX}{{3}}|[Tx]{_HEX}{{8}}){n}{_HEX}{{{2 * n}}}(?:{_HEX}{{4}}(?=[tTrRx]|$))?" for n in range(9)),
+    rf"(?:r{_HEX}{{3}}|R{_HEX}{{8}})[0-8]",
+]))  # fmt: skip
 """A data frame of n bytes, with or without the adapter's milliseconds behind it, or a remote frame."""
 
 
@@ -93,42 +97,59 @@ def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | Non
 
 
 class _Stamps:
-    """Converts python-can's stamps, seconds since 1970, to a link's clock, where they are of the system's own clock.
+    """Puts python-can's stamps, seconds since 1970 or since an adapter's start, on a link's clock.
 
-    A stamp's age is the system's time at receipt less the stamp. A frame that the reader waited for has just been
-    received: if the stamps of such frames are old or from the future, they are of another clock, or too coarse.
+    A stamp's age is the system's time at receipt less the stamp. A frame that the reader waited for was just received,
+    and so was at least one of some hundred: the least recent age is the lag of the stamps' clock. If the system's clock
+    is set meanwhile, queued frames have stamps of before: their age is by the clock that makes it least.
     """
 
     def __init__(self, clock: Clock, wall: Clock = time.time_ns) -> None:
         self._clock, self._wall = clock, wall
-        self._offset_ns = wall() - clock()
-        self._ages_ns: deque[int] = deque(maxlen=31)
-        """Of frames that the reader waited for."""
+        self._walls: deque[int] = deque(maxlen=4)
+        self._least: deque[tuple[int, int]] = deque(maxlen=2)
+        self._seen, self._known = 0, False
+        self._late: deque[int] = deque(maxlen=31)
+        """Age of the frames that the reader waited for, less the least age."""
 
     @property
-    def usable(self) -> bool:
-        """Whether frames that were just received have new stamps, as far as is known."""
-        return not self._ages_ns or abs(statistics.median(self._ages_ns)) < AT_ONCE_NS
+    def refused(self) -> bool:
+        """Whether stamps scatter too much to be used: half of the frames that were just received have old ones."""
+        return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
+
+    def lag_ns(self) -> int:
+        """Return the lag of the stamps' clock behind the system's; 0 if it is that clock, or not known yet."""
+        least_ns = min((least_ns for _, least_ns in self._least), default=0)
+        return least_ns if self._known and abs(least_ns) > SYSTEMS_OWN_NS else 0
 
     def __call__(self, stamp_s: float, *, waited: bool) -> int:
         """Return the time of receipt of a frame; `waited`: whether the reader waited for it."""
-        now_ns = self._clock()
-        offset_ns = self._wall() - now_ns
-        if abs(offset_ns - self._offset_ns) > AT_ONCE_NS:  # the clock was set: queued frames have stamps of before
-            self._ages_ns.clear()
-            self._ages_ns.append(AT_ONCE_NS)
-        self._offset_ns = offset_ns
-        age_ns = now_ns + offset_ns - round(1e9 * stamp_s)
+        now_ns, lag_ns = self._clock(), self.lag_ns()
+        wall_ns = self._wall() - now_ns
+        if self._walls and abs(wall_ns - self._walls[-1]) < SYSTEMS_OWN_NS:
+            self._walls[-1] = wall_ns
+        else:
+            self._walls.append(wall_ns)
+        ages_ns = [now_ns + one - round(1e9 * stamp_s) for one in self._walls]
+        possible = [age_ns for age_ns in ages_ns if age_ns >= lag_ns - SYSTEMS_OWN_NS]
+        age_ns = min(possible) if possible else ages_ns[-1]
+        self._seen += 1
+        self._known |= waited or self._seen >= LEAST_OF
+        if not self._least or now_ns - self._least[-1][0] > WINDOW_NS:
+            self._least.append((now_ns, age_ns))
+        elif age_ns < self._least[-1][1]:
+            self._least[-1] = (self._least[-1][0], age_ns)
+        waited_ns = age_ns - self.lag_ns()
         if waited:
-            self._ages_ns.append(age_ns)
-        return now_ns - age_ns if self.usable and 0 <= age_ns < 1e9 * WAITED_S else now_ns
+            self._late.append(waited_ns)
+        return now_ns - waited_ns if 0 <= waited_ns < 1e9 * WAITED_S and not self.refused else now_ns
 
 
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
-    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), converted to the link's clock. If
-    stamps are of another clock than the system's, it is the time of receipt, and such frames are counted.
+    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), put on the link's clock. Where
+    stamps lag behind the system's clock, the least age is taken off, and such frames are counted.
 
     Parameters
     ----------
@@ -177,7 +198,7 @@ class CanBus(CanLink):
                 came = message is not None
                 if came:
                     t_ns = self._stamp(message.timestamp, waited=waited)
-                    if not self._stamp.usable:
+                    if self._stamp.lag_ns() or self._stamp.refused:
                         self.counts["frames stamped by another clock"] += 1
                     frame = _data_frame(message, t_ns, self.counts)
                     if frame is not None:
@@ -193,9 +214,10 @@ class CanBus(CanLink):
         raise self._nothing_came(timeout_s)
 
     def _slcan_frame(self, timeout_s: float | None) -> str | None:
-        """Return the next line of python-can's slcan without line feed; one that is no frame is empty, and counted.
+        """Return the next frame of python-can's slcan, which takes the bytes between two CR or BEL for one.
 
-        BEL, by which an adapter reports an error, is counted too.
+        Line feeds are left out; frames whose CR was lost are separated; other bytes are counted, and so is BEL, by
+        which an adapter reports an error.
         """
         line: str | None = self._read_line(timeout_s)
         if not line:
@@ -203,10 +225,14 @@ class CanBus(CanLink):
         if line.endswith("\a"):
             self.counts["errors of the adapter"] += 1
         text = line.strip("\r\n\a")
-        if text and text[0] not in "dDbBzZVNF" and not _SLCAN.fullmatch(text):  # FD frames, and answers to commands
+        if not text or text[0] in "dDbBzZVNF":  # FD frames, and answers to commands
+            return f"{text}\r"
+        frames = [found[0] for found in _SLCAN.finditer(text)]
+        if _SLCAN.sub("", text):
             self.counts["unreadable frames"] += 1
-            return "\r"
-        return f"{text}\r"
+        for frame in frames[1:]:
+            self._bus._queue.put_nowait(f"{frame}\r")
+        return f"{frames[0]}\r" if frames else "\r"
 
     def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
         import can
@@ -227,6 +253,7 @@ class CanBus(CanLink):
             raise self._unplugged(error) from error
 
     def _release(self) -> None:
+
         try:
             self._bus.shutdown()
         except _raised():
@@ -235,7 +262,7 @@ class CanBus(CanLink):
 
 
 def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
-    """Return the data frames of a log in any format of python-can, and counts of others (:class:`CanLink`).
+    """Return the data frames of a log in any format of python-can, and what was left out (:class:`CanLink`).
 
     Stamps are nanoseconds since the log's first message. BLF stamps come within 0.25 us, since python-can returns
     float64.
@@ -260,7 +287,7 @@ def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
         if file.suffix.lower() == ".asc" and b"timestamps relative" in b" ".join(file.read_bytes()[:4096].split()):
             raise ValueError("its times are relative to the event before; export it with absolute ones")
         with can.LogReader(file) as log:
-            for number, message in enumerate(log, 1):  # noqa: B007  (in the message of a damaged log)
+            for number, message in enumerate(log, 1):  # noqa: B007  (said where it is damaged)
                 began_s = message.timestamp if began_s is None else began_s
                 frame = _data_frame(message, round((message.timestamp - began_s) * 1e9), counts)
                 frames += [] if frame is None else [frame]

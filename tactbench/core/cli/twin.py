@@ -10,8 +10,10 @@ import click
 from tactbench.core.cli.options import EFFECTS, format_option
 
 if TYPE_CHECKING:
+    from tactbench.core.matrix.store import Row
     from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
 
+_SCORES = ("effects", "estimator", "metric", "unit", "score", "sim_s", "reason")
 _EFFECTS = ("included", "effect", "cost_ms", "change", "unit", "reason")
 
 
@@ -24,19 +26,21 @@ def command() -> None:
 @click.option("--sensor", "sensor_name", required=True, metavar="NAME", help="Sensor.")
 @click.option("--task", "task_name", required=True, metavar="NAME", help="Task whose scenes are planned.")
 @click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
-              help="Recordings to time each effect with; 0: the plan alone, without times.")  # fmt: skip
+              help="Recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
 @EFFECTS
 @format_option("table", "json", "csv")
 def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, shape: str) -> None:
     """Show which effects a task's scenes are simulated with, which are left out, the reasons, and what each costs.
 
-    For scores with all effects: `tactbench run --effects +all --out DIR`, then `tactbench compare` of both folders.
+    The last table has the task's score with the effects chosen and with all of them.
     """
     from tactbench.core.cli.grid import print_records
+    from tactbench.core.cost.knobs import task_score
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.names import grouped
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.plugins.rigs import rig_context
+    from tactbench.core.study.progress import progress
     from tactbench.core.study.simulation import simulation_of
     from tactbench.core.tables.terminal import remark
 
@@ -65,13 +69,23 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
             kinds = ["" if one["included"] else "skipped" for one in found]
             title = f"{sensor_name}, {task_name}: {group[0].name}, {len(group)} scenes with these effects"
             print_records(found, shape, title=title, columns=_EFFECTS, kinds=kinds)
+    scores: dict[str, Row] = {}
+    with progress() as display:
+        for name, more in (("chosen", ()), ("all", ("+all",))) if rounds else ():
+            variant = simulation.model_copy(update={"effects": (*simulation.effects, *more)})
+            scores[name] = task_score(registry, rig_name, sensor_name, task_name, variant, display)
     if shape == "table":
         remark(
             "change: what leaving out an included effect changes, estimated; for an effect left out the upper bound of "
             "what including it would change; 0: exactly nothing."
         )
-    else:
-        print_records(records, shape)
+        table = [{"effects": name, **row} for name, row in scores.items()]
+        print_records(table, shape, title="Score with the effects chosen and with all of them (SIM)", columns=_SCORES)
+        return
+    added = {f"{column}{'' if name == 'chosen' else '_all_effects'}": row[key]
+             for name, row in scores.items()
+             for column, key in (("score", "score"), ("sim_s", "sim_s"), ("score_reason", "reason"))}  # fmt: skip
+    print_records([{**record, **added} for record in records], shape)
 
 
 def _effect(row: Explained) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -80,6 +81,18 @@ def quick_estimator(registry: Registry, task: str) -> str:
     if not fitting:
         raise UsageError(f"No estimator for task {task!r} is installed.", hint="See `tactbench list estimators`.")
     return next((one.name for one in fitting if one.linear and not one.grid), fitting[0].name)
+
+
+def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, progress: Progress) -> Row:
+    """Record every scene of `task` by `simulation` in a temporary folder and return the row of a quick estimator."""
+    estimator = quick_estimator(registry, task)
+    choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
+    matrix = MatrixSpec(
+        rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
+    )
+    with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
+        outcome = run_matrix(matrix, Store(Path(folder)), progress=progress)
+    return next(row for row in outcome.rows if row["estimator"] == estimator)
 
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
