@@ -284,10 +284,13 @@ class Positioner(Driver):
         self.retreat()
         until_ns = self.clock() + round(1e9 * within_s)
         while self.clock() < until_ns:
-            self.update(0.01)
+            try:
+                self.update(0.01)
+            except PositionerError:  # half an answer to the other process, or a lost one
+                self.retreat()
             if not self.moving:
                 return self.position
-        raise PositionerSilentError(f"It is at {self.position:g} {within_s:.1f} s after it was sent away.")
+        raise PositionerSilentError(f"The axis was sent away and is at {self.position:g} m after {within_s:.1f} s.")
 
     # What a subclass calls --------------------------------------------------------------------------------------------
 

@@ -35,8 +35,6 @@ LONGEST_AHEAD = 24
 """Bytes that may be ahead of a retreat: a question and a move, `TPOS`, `SP10000`, `LA-12345`, `M` and CRs (derived)."""
 TRIES = 5
 """Answers of which two in a row must agree (assumed: damaged lines are rare)."""
-AGAIN_S = 0.25
-"""Period after which a rescue sends its retreat again (assumed)."""
 STANDING_NS = 20_000_000
 """Period of the status polls of a motor at rest, which leave the line and the host idle meanwhile (assumed)."""
 
@@ -309,31 +307,19 @@ class FaulhaberDriver(Positioner):
         self.state = self.state and replace(self.state, target=math.nan)
 
     def rescue(self, within_s: float | None) -> float:
-        """Retreat, or stand, with a drive that another process had; see `Positioner`.
+        """Retreat, or stand, with a drive that another process had, and which keeps its positions; see `Positioner`.
 
-        The drive keeps its positions; nothing else is assumed of what stands on the line. Half a command that may stand
-        there is ended first, so that the first answer may be a refusal.
+        Half a command that may stand on the line is ended first.
         """
-        target_m = self.facts.retreat
-        if within_s is None or math.isnan(target_m):
-            self.link.write(b"\r" + encode("V", 0))
+        command = encode("V", 0) if within_s is None else retreat_command(self.options)
+        self.link.write(b"\r" + command)
+        if within_s is None or math.isnan(self.facts.retreat):
             return math.nan
-        until_ns = self.clock() + round(1e9 * within_s)
-        sent_ns, there, place_m = -math.inf, 0, math.nan
-        while self.clock() < until_ns:
-            if not there and self.clock() - sent_ns > 1e9 * AGAIN_S:
-                self.link.write(b"\r" + retreat_command(self.options))
-                self._exchange.quiet()
-                sent_ns = self.clock()
-            with suppress(PositionerError):
-                place_m = self.options.position_m(self._ask("POS").value)
-                there = there + 1 if abs(place_m - target_m) <= self.facts.near else 0
-                if there == 2:  # One could be the late answer to another question.
-                    return place_m
-        raise PositionerError(
-            f"The motor was sent to {target_m:g} m and reports {place_m:g} m after {within_s:.1f} s.",
-            hint="Stand clear, cut its supply, and see what is in its way.",
-        )
+        self._exchange.quiet()
+        with suppress(PositionerError):
+            self.locate()
+        self._watching = True
+        return super().rescue(within_s)
 
     # Commands that are waited for -------------------------------------------------------------------------------------
 
