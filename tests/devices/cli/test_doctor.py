@@ -129,7 +129,8 @@ def test_what_a_stream_lacks_is_told(options, says):
     assert (pad.identity, pad.counts, motor.identity) == ({"model": "paced"}, Paced.counts, {"model": "paced"})
     for stream in pad.streams:  # of 300 values: a standard error of 4 %; samples that are missing are in no noise
         assert stream["sd_largest"] == pytest.approx(2, rel=0.15)
-        assert (stream["noisiest"], stream["constant"], stream["mean"]["t2"]) == ("t1", ["t2"], 1000)
+        assert (stream["noisiest"], stream["constant"]) == ("t1", ["t2"])
+        assert stream["mean"] == pytest.approx(1000, abs=0.2)
         assert stream["lost"] == options.get("lost", 0)
     assert log == ["identify", "start", "stop", "close", "identify", "close"], "a motor is not started"
 
