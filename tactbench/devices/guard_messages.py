@@ -135,7 +135,8 @@ class Limits:
     def __post_init__(self) -> None:
         positive = (
             self.force_ceiling_n, self.travel_ceiling_n, self.touch_n, self.step_m, self.speed_m_s, self.heartbeat_s,
-            self.force_age_s, self.clear_n, self.clear_s, 1.0 if self.torque_ceiling_nm is None else self.torque_ceiling_nm,
+            self.force_age_s, self.clear_n, self.clear_s,
+            1.0 if self.torque_ceiling_nm is None else self.torque_ceiling_nm,
         )  # fmt: skip
         low, high = self.travel_m
         if not (
