@@ -213,13 +213,11 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
     ]  # fmt: skip
     if file is None or not names:
         return None
-    ours = Emulation(time="real", factor=factor, devices=tuple(names))
+    ours = Emulation(time="virtual" if file.emulated else "real", factor=factor, devices=tuple(names))
     if file.emulated or file.emulation.control:
         how = file.emulation
         faults = [f"{name}: {fault}" for name in names for fault in file.entries()[name].faults]
-        ours = ours.model_copy(
-            update={"time": how.time, "seed": how.seed, "physics": how.physics, "faults": tuple(faults)}
-        )
+        ours = ours.model_copy(update={"seed": how.seed, "physics": how.physics, "faults": tuple(faults)})
     return ours
 
 

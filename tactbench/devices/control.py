@@ -1,6 +1,6 @@
-"""The loop that beats the guard: a control period at a time, in virtual time or in a thread of its own.
+"""The control loop of a press: it sends a beat to the guard each period, in virtual time or in a thread of its own.
 
-A beat is a step of the press, so a controller that hangs is a beat that does not come, and the guard retreats.
+Each beat carries a step of the press, so the guard retreats if the controller hangs.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ from tactbench.devices.press import Press
 from tactbench.links.link import Clock
 
 STOP_S = 10.0
-"""The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
+"""Timeout for the end of the thread (assumed: a control period, and an answer of a guard in another process)."""
 
 
 class Control:
-    """Beats a guard with the steps of a press.
+    """Loop that sends the steps of a press to a guard.
 
     Parameters
     ----------
     guard
-        Armed right before :meth:`carry` or :meth:`start` is called.
+        A guard that is armed right before :meth:`carry` or :meth:`start` is called.
     limits
-        What it was armed with.
+        Its limits.
     armed
-        What it answered.
+        Its answer to `arm`.
     press
-        What is done.
+        The press.
     received
-        Returns how many rows of the sensor have come; while it stays the same they become old.
+        Returns the number of rows of the sensor so far.
     clock
-        The rig's.
+        The rig's clock.
     period_s
         Control period.
     stale_s
-        How old they may be.
+        Longest time without a new row of the sensor.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Control:
         self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self.report = armed
-        """What the guard answered last."""
+        """The last answer of the guard."""
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[float] = []
@@ -73,32 +73,33 @@ class Control:
         self._over = threading.Event()
         self._stop = ""
         self._thread: threading.Thread | None = None
-        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self.counts: Mapping[str, Mapping[str, int]] = {}
+        """Counts of guard, axes and force sensor in the last control period."""
 
     def blocks(self) -> Iterator[Block]:
-        """Yield what force sensor and motor have sent and was not yet yielded."""
+        """Yield the blocks of force sensor and motor since the last call."""
         while self._blocks:
             yield self._blocks.popleft()
 
     def events(self) -> Iterator[Event]:
-        """Yield what has happened and was not yet yielded."""
+        """Yield the events since the last call."""
         while self._events:
             yield self._events.popleft()
 
     def carry(self, until_ns: int) -> None:
-        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time."""
+        """Advance to a nanosecond of the clock, with a beat whenever one is due: for virtual time."""
         while self._next_ns <= until_ns:
             self._guard.advance(self._next_ns)
             self._period()
         self._guard.advance(until_ns)
 
     def start(self) -> None:
-        """Beat from a thread of its own, until :meth:`stop`: for real time."""
+        """Send beats from a thread of its own, until :meth:`stop`: for real time."""
         self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
         self._thread.start()
 
     def retreat(self, why: str, within_s: float) -> None:
-        """Let the motor retreat from the next control period on; return when it has ended, or the time is over."""
+        """Let the motor retreat from the next control period on; return at the end of the retreat or of the time."""
         self._stop = self._stop or why
         until_ns = self._clock() + round(1e9 * within_s)
         while not self.press.over and self._clock() < until_ns:
@@ -108,16 +109,12 @@ class Control:
                 self._over.wait(1e-9 * self._period_ns)
 
     def stop(self) -> None:
-        """End the thread, if there is one; the guard may be used by the caller then."""
+        """End the thread, if there is one; the caller may use the guard afterwards."""
         self._over.set()
         if self._thread is not None:
             self._thread.join(STOP_S)
-        with suppress(TactbenchError):  # a guard that is lost has nothing more to say
+        with suppress(TactbenchError):  # a guard that is lost
             self._gather()
-
-    def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what guard, motor and force sensor had counted in the last control period."""
-        return self._counts
 
     def _run(self) -> None:
         try:
@@ -129,26 +126,28 @@ class Control:
             self.press.abandon()
 
     def _gather(self) -> None:
-        for block in self._guard.force_blocks():
-            self._blocks.append(block)
+        guard = self._guard
+        for block in guard.force_blocks:
             self._raw += self._limits.pressing_n(block.data).tolist()
-        self._blocks.extend(self._guard.motor_blocks())
-        self._events.extend(self._guard.events())
-        self._counts = self._guard.counts()
+        self._blocks += [*guard.force_blocks, *guard.motor_blocks]
+        self._events += guard.events
+        for items in (guard.force_blocks, guard.motor_blocks, guard.events):
+            items.clear()
+        self.counts = guard.counts
 
     def _period(self) -> None:
         now_ns = self._clock()
         late_ns = now_ns - self._next_ns
         self.late += late_ns > self._period_ns
         rows = self._received()
-        # Where it was this process that hung, the sensor's reading hung with it.
+        # If this process hung, the reading of the sensor hung with it.
         if rows != self._rows or late_ns > self._stale_ns:
             self._rows, self._rows_ns = rows, now_ns
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
         press = self.press
         if 1e-9 * late_ns > self._limits.heartbeat_s:
             press.fail(f"the program stood still for {1e-9 * late_ns:.1f} s")
-        if late_ns > self._period_ns:  # what was reported then is not how it is now
+        if late_ns > self._period_ns:  # the last report is outdated
             self.report = self._guard.beat(Beat(now_ns, str(press.state)))
         self._gather()
         raw, self._raw = self._raw, []

@@ -1,4 +1,4 @@
-"""What a driver is: one device behind one link, read in blocks; and its options."""
+"""Driver of one device behind one link, which is read in blocks; and its options."""
 
 from __future__ import annotations
 
@@ -19,47 +19,47 @@ from tactbench.links.link import Clock, Link
 
 @dataclass(frozen=True)
 class DriverSettings:
-    """What a driver is built from."""
+    """Arguments of a driver."""
 
     open_link: Callable[[], Link]
-    """Opens the link that the rig file names, or the emulator's."""
+    """Function that opens the link of the rig file, or of the emulator."""
     streams: tuple[StreamSpec, ...] = ()
     """Streams of the sensor's spec; empty for a device that is no sensor."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """What the rig file says of this device beside its link; the driver refuses what it does not know."""
+    """Options of the device in the rig file; the driver refuses unknown ones."""
     clock: Clock = time.monotonic_ns
     """The host's clock, the same as the link's; virtual where time is virtual."""
 
 
 class Options(BaseModel):
-    """Options of one device, the same for its driver and its emulator, or settings of a rig: known and finite ones."""
+    """Model of the options of a device, for its driver and its emulator, or of a rig's settings: known, finite ones."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Driver(ABC):
-    """One device: open once it is made, until :meth:`close` or the end of its ``with`` block.
+    """Driver of one device: open once it is made, until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a driver. Its only waits are its link's, so that it runs in virtual time as in real time.
+    One thread uses a driver. It waits in its link alone, so that it runs in virtual time as in real time.
 
-    What is wrong with single samples is in their blocks' quality and in :attr:`counts`, and raises nothing; what ends
-    the reading raises: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
+    Bad samples raise nothing: they are marked in the blocks' quality and counted in :attr:`counts`. An error ends the
+    reading: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
 
     Raises
     ------
     UsageError
-        For options that are not known or contradict each other, or a link of another kind.
+        If options are not known or contradict each other, or the link is of another kind.
     LinkError
         If the link does not open.
     """
 
     device: ClassVar[str] = ""
-    """Name in messages; empty: that of the class."""
+    """Name in messages; empty: the name of the class."""
     link_kind: ClassVar[type[Link]]
-    """Of the link that is opened; and an example of its address."""
+    """Kind of its link; and an example of its address."""
     address: ClassVar[str] = "those of docs/links.md"
     options_kind: ClassVar[type[Options]] = Options
-    """What a rig file's entry may say."""
+    """Model of the options in a rig file's entry."""
 
     def __init__(self, settings: DriverSettings) -> None:
         device = self.device or type(self).__name__
@@ -71,15 +71,15 @@ class Driver(ABC):
     @property
     @abstractmethod
     def streams(self) -> tuple[StreamSpec, ...]:
-        """What it reads, as it is set up now; rates as far as they are known."""
+        """Streams that it reads, as it is set up now; rates as far as they are known."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What was counted since it was opened, by name: parity errors, frames lost … An empty one: all was well."""
+        """Counts since it was opened, by name: parity errors, frames lost, and others."""
         return {}
 
     def identify(self) -> Mapping[str, str]:
-        """Return what the device says of itself (model, serial, firmware), to be asked before :meth:`start`.
+        """Return the identity that the device reports (model, serial, firmware); called before :meth:`start`.
 
         Raises
         ------
@@ -92,37 +92,36 @@ class Driver(ABC):
     def start(self) -> None:
         """Set the device up and let it sample; raises as :meth:`identify`.
 
-        What it sent before is discarded (:meth:`~tactbench.links.link.Link.discard`): the first row is of the first
+        Data from before are discarded (:meth:`~tactbench.links.link.Link.discard`): the first row is of the first
         whole frame after this call.
         """
 
     @abstractmethod
     def read(self, timeout_s: float) -> list[Block]:
-        """Return what has come since the last call, a block a stream that has any.
+        """Return the rows received since the last call, a block for each stream that has any.
 
         Parameters
         ----------
         timeout_s
-            Seconds to wait for the first; 0 asks without waiting. An empty list: nothing came, which is no error.
+            Longest wait for the first row [s]. Without a row the list is empty, which is no error.
 
         Returns
         -------
         list of Block
-            ``t_ns`` on the host's clock, as well as the driver knows it when the sample comes: of a device with a
-            counter the time of receipt. ``device_ns`` where the device has a clock of its own, counted on over its
-            wraps. ``sequence`` where it numbers its samples: counted on over its wraps, too.
+            ``t_ns`` on the host's clock, as well as the driver knows it at receipt. ``device_ns`` where the device has
+            a clock of its own, and ``sequence`` where it numbers its samples, both unwrapped.
         """
 
     @abstractmethod
     def stop(self) -> None:
-        """Let the device stop sampling; what is still under way is dropped. Raises nothing if it is gone."""
+        """Let the device stop sampling, and drop data under way. Raises nothing if the device is gone."""
 
     def tare(self) -> bool:
-        """Let the device take its present reading as zero; return whether it can do so itself."""
+        """Let the device take its present reading as zero; return whether it supports this."""
         return False
 
     def close(self) -> None:
-        """Stop if it is sampling, and close the link; once closed, this does nothing."""
+        """Stop if it is sampling, and close the link; a second call does nothing."""
         self.stop()
         self.link.close()
 
@@ -134,7 +133,7 @@ class Driver(ABC):
 
 
 def fault_text(error: Exception) -> str:
-    """Return what an error says within a sentence: without its next step and its full stop."""
+    """Return the message of an error for use in a sentence: without hint and full stop."""
     return (error.message if isinstance(error, TactbenchError) else error_text(error)).rstrip(".")
 
 
@@ -146,5 +145,5 @@ def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: 
     link = settings.open_link()
     if not isinstance(link, kind):
         link.close()
-        raise UsageError(f"{device} cannot be spoken to through {link.address}.", hint=f"Use a link like {example}.")
+        raise UsageError(f"{device} has another kind of link than {link.address}.", hint=f"Use one like {example}.")
     return link

@@ -1,4 +1,4 @@
-"""What an emulator is: a device at the far end of a link, as a model without input or output of its own."""
+"""Emulators: models of devices at the far end of a link, without input or output of their own."""
 
 from __future__ import annotations
 
@@ -18,44 +18,44 @@ if TYPE_CHECKING:
     import numpy as np
 
 Senses: TypeAlias = Callable[[float], Mapping[str, float]]
-"""Second -> what the device's channels would read, by their names and in their units; those left out are at rest."""
+"""Function from a second to the readings of the device's channels by name, in their units; the others are at rest."""
 
 Sent: TypeAlias = tuple[float, "bytes | CanFrame"]
-"""When a piece has left the device, in seconds, and the piece: bytes of a stream, a CAN frame, a datagram."""
+"""Second at which a piece has left the device, and the piece: bytes of a stream, a CAN frame, a datagram."""
 
 
 class DeviceEmulator(Protocol):
-    """A device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back.
+    """Device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back.
 
-    It gives the bytes of a serial line their time itself. One that has a `bytes_per_s` says what a line must carry.
+    The times of a serial line's bytes are those at which the line has carried them.
     """
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take what came from the host; return what has left the device by `now_s` and was not yet returned."""
+        """Take a piece from the host; return as :meth:`poll`."""
 
     def poll(self, now_s: float) -> Sequence[Sent]:
-        """Return what has left the device by `now_s` and was not yet returned, in order, each with its time."""
+        """Return the pieces that have left the device since the last call until `now_s`, in order of their times."""
 
     def next_s(self) -> float:
-        """Return when `poll` has something to do next; infinite: not before something comes. Only calls change it."""
+        """Return the second of the next event; infinite: none before a piece comes. Only calls change it."""
 
 
 class SpiDeviceEmulator(Protocol):
-    """A device on an SPI bus: it sends only while the host clocks bytes."""
+    """Device on an SPI bus: it sends only while the host clocks bytes."""
 
     def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
-        """Return as many bytes as go in, from a select mask and the second at which the first begins."""
+        """Return as many bytes as go in; `select` is the mask of select lines, `now_s` the second of the first byte."""
 
 
 @dataclass(frozen=True)
 class EmulatorSettings:
-    """What an emulator is built from."""
+    """Arguments of an emulator."""
 
     senses: Senses
     rng: np.random.Generator
-    """This device's own."""
+    """Generator of this device alone."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Those of the rig file's entry, which the driver gets as well: board numbers, periods, rates."""
+    """Options of the rig file's entry, which the driver gets as well: board numbers, periods, rates."""
     faults: Sequence[str] = ()
     """Faults, as :meth:`~tactbench.devices.emulator.Fault.parse` reads them."""
 
@@ -64,29 +64,29 @@ LINK_FAULTS = {
     "unplug": "the link is gone from start_s on",
     "late": "what the device sends comes later by delay_s, in the same order",
 }
-"""Faults that every emulated device has, and what they do."""
+"""Faults that every emulated device has, and their effects."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault from `start_s` until before `end_s`, seconds of the clock that the emulator is given.
+    """Fault from `start_s` until before `end_s`, seconds of the emulator's clock.
 
-    A device's own faults are a frozen subclass with :attr:`known`, and fields of its own for their details.
+    A device's own faults are a frozen subclass with :attr:`known`, and further fields for their details.
 
     Raises
     ------
     UsageError
-        For a name that the device does not have, or `every` below 1.
+        If the device has no fault of that name, or `every` is below 1.
     """
 
     known: ClassVar[Mapping[str, str]] = {}
-    """Names of a device's faults, and what they do."""
+    """Names of a device's faults, and their effects."""
 
     name: str
     start_s: float = -math.inf
     end_s: float = math.inf
     every: int = 1
-    """Of the words, frames, lines or datagrams that it could concern: each n-th."""
+    """The fault concerns each n-th word, frame, line or datagram that it could concern."""
 
     def __post_init__(self) -> None:
         if self.name not in self.known:
@@ -103,7 +103,7 @@ class Fault:
         Raises
         ------
         UsageError
-            If name or key is unknown, or a value is not what the field holds.
+            If name or key is unknown, or a value does not fit the field.
         """
         import yaml
         from pydantic import TypeAdapter, ValidationError
@@ -126,29 +126,23 @@ class Fault:
 
 
 def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:
-    """Return whether a fault `name` concerns the next word, line or datagram; `seen` counts those it could concern."""
+    """Return whether a fault `name` concerns the next word, line or datagram; `seen` counts the possible ones."""
     concerned = [fault for fault in faults if fault.name == name and fault.active(now_s)]
     seen.update(concerned)
     return any(seen[fault] % fault.every == 0 for fault in concerned)
 
 
 class RowEmulator(ABC):
-    """The far end of a :class:`~tactbench.devices.row_driver.RowDriver`'s link; it knows no faults of its own.
-
-    Raises
-    ------
-    UsageError
-        For a fault.
-    """
+    """Emulator of the device of a :class:`~tactbench.devices.row_driver.RowDriver`, without faults of its own."""
 
     stream: ClassVar[StreamSpec]
-    """What it senses."""
+    """Stream that it senses."""
     rate_hz: ClassVar[float] = 0.0
-    """Rows a second while it samples; 0: only when it is asked."""
+    """Rows a second while it samples; 0: it sends answers alone."""
     from_power_on: ClassVar[bool] = False
-    """Whether it samples without being told to."""
+    """Whether it samples without a command."""
     answer_s: ClassVar[float] = 1e-3
-    """Seconds that an answer takes; above 0, or the time of a host that asks again at once would stand still."""
+    """Seconds that an answer takes; above 0, or virtual time would stand still while a host polls."""
 
     def __init__(self, settings: EmulatorSettings) -> None:
         for fault in settings.faults:
@@ -163,7 +157,7 @@ class RowEmulator(ABC):
         """Return a row as it leaves the device: bytes, datagrams or CAN frames."""
 
     def told(self, piece: bytes | CanFrame, now_s: float) -> Iterable[bytes | CanFrame]:
-        """Return the answer to what the host sent; :meth:`sample` may be called here."""
+        """Return the answer to a piece from the host; :meth:`sample` may be called here."""
         return ()
 
     def sample(self, now_s: float, on: bool = True) -> None:
@@ -171,17 +165,12 @@ class RowEmulator(ABC):
         self._since_s, self._rows = (now_s if on else math.inf), 0
 
     def sensed(self, now_s: float) -> list[float]:
-        """Return what the channels read: their rest level where nobody says more."""
+        """Return the readings of the channels; those that are not sensed are at their rest level."""
         felt = self.settings.senses(now_s)
         return [felt.get(one.name, 0.0 if one.rest is None else one.rest.to(one.unit)) for one in self.stream.channels]
 
-    @property
-    def bytes_per_s(self) -> float:
-        """What it sends while it samples, by its rate and the length of a row: a baud rate must carry that."""
-        return self.rate_hz * sum(len(piece) for piece in self.sent(self.sensed(0.0)) if isinstance(piece, bytes))
-
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take what came from the host."""
+        """Take a piece from the host; the answers are sent `answer_s` later."""
         before = self.poll(now_s)
         self._answers.extend((now_s + self.answer_s, answer) for answer in self.told(piece, now_s))
         return before

@@ -1,4 +1,4 @@
-"""The force loop: one control law, the motor and skin around it, and which gains settle.
+"""The force loop: one control law, a model of motor and skin around it, and the gains that settle.
 
 One step of length T, position positive into the skin, measured force m, filter y, integral i, command c:
 
@@ -10,7 +10,7 @@ r is the slope of the wanted force and k the assumed stiffness: the feed-forward
 increments c += ki T e; an admittance M x'' + D x' = e is ki = 1/D with a filter of time M/D. Filter and motor are
 held-input solutions of their first-order laws, exact for every T. Derived.
 
-Lengths have one unit of the caller's choice, in the gains as in the positions: m in rigs, mm in the twin.
+Gains and positions are in one unit of length: m in rigs, mm in the twin.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from tactbench.core.spec.drive import ForceLoop
 
 LATE = 1.5
-"""Periods after which a sample is late: half a period more than it should be."""
+"""Periods after which a sample is late: half a period more than one."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ForceLaw:
     speed: float = math.inf
     """Largest speed of the command [length / s]."""
     windup_s: float = math.inf
-    """Times `speed` is how far the command may be from the measured position."""
+    """Time whose way at `speed` is the largest distance of the command from the measured position."""
     travel: tuple[float, float] = (-math.inf, math.inf)
     """Least and greatest command."""
     feed_forward: float = math.inf
@@ -62,17 +62,16 @@ class ForceLaw:
 
     def __post_init__(self) -> None:
         gains = (self.proportional, self.integral)
-        positive = (self.period_s, self.speed, self.windup_s, self.feed_forward, self.cutoff_hz or 1.0)
-        for wrong, problem in (
-            (not all(0 <= gain < math.inf for gain in gains) or gains == (0.0, 0.0), "its gains are negative or all 0"),
-            (not all(value > 0 for value in positive), "a period, speed, time, rate or stiffness is not above 0"),
-            (not self.travel[0] < self.travel[1], "its travel ends before it begins"),
+        positive = (self.period_s, self.speed, self.windup_s, self.feed_forward, self.cutoff_hz or 1.0, max(gains))
+        if not (
+            all(0 <= gain < math.inf for gain in gains)
+            and all(value > 0 for value in positive)
+            and self.travel[0] < self.travel[1]
         ):
-            if wrong:
-                raise UsageError(f"The force loop cannot be stepped: {problem}.", hint="Correct its numbers.")
+            raise UsageError(f"The force loop cannot be stepped: {self}.", hint="Correct its numbers.")
 
     def kept(self, passed_s: float) -> float:
-        """Return a: what the filter keeps of its past after a time."""
+        """Return a, the share of its past that the filter keeps after a time."""
         return 0.0 if self.cutoff_hz is None else math.exp(-2 * math.pi * self.cutoff_hz * passed_s)
 
 
@@ -92,15 +91,12 @@ class ForceController:
         The filtered force [N].
     target
         The position commanded last.
-    limited
-        Whether a limit acted in the last step.
     """
 
     def __init__(self, law: ForceLaw, force_n: float, position: float) -> None:
         _check_known(force_n, position)
         self.law = law
         self.filtered_n, self.target = force_n, position
-        self.limited = False
         self._integral = position
 
     def step(
@@ -108,15 +104,15 @@ class ForceController:
     ) -> float:
         """Return the next command, positive into the skin.
 
-        Limited are, in this order, the command's speed, its distance from the measured position, and its travel. While
-        a limit acts, the integral does not grow in its direction. A late sample moves and integrates nothing.
+        The command's speed is limited, then its distance from the measured position, then its travel. While a limit
+        acts, the integral does not grow in its direction. A late sample moves and integrates nothing.
 
         Parameters
         ----------
         force_n, position
             Raw force, positive when pressing, and measured position.
         passed_s
-            Since the step before.
+            Time since the step before.
         setpoint_n, slope_n_s
             Wanted force and its slope, for the feed-forward.
 
@@ -133,7 +129,6 @@ class ForceController:
         law = self.law
         kept = law.kept(passed_s)
         self.filtered_n = kept * self.filtered_n + (1 - kept) * force_n
-        self.limited = False
         if passed_s > LATE * law.period_s:
             return self.target
         missing = setpoint_n - self.filtered_n
@@ -144,10 +139,9 @@ class ForceController:
         target = min(max(wish, self.target - most), self.target + most)
         target = min(max(target, position - ahead), position + ahead)
         target = min(max(target, law.travel[0]), law.travel[1])
-        self.limited = target != wish
-        if not (self.limited and growth * (wish - target) > 0):
+        if growth * (wish - target) <= 0:  # no limit acts against the growth
             self._integral = integral
-        if law.proportional == 0:  # increments: what was cut is forgotten
+        if law.proportional == 0:  # increments: the part that was cut is dropped
             self._integral = target
         self.target = target
         return target
@@ -167,7 +161,7 @@ class LoopModel:
 
     law: ForceLaw
     lag_kept: float
-    """b, how much of its way the motor has left after one step; 0: no lag."""
+    """b, the share of its way that the motor has left after one step; 0: no lag."""
     delay_steps: int
     speed: float = math.inf
     """The motor's largest speed [length / s]; at a distance it is limited to what the motor can brake."""
@@ -176,28 +170,15 @@ class LoopModel:
     """Step of the measured force [N]; 0: not rounded."""
 
     @classmethod
-    def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
-        """Return the model of a declared loop with lengths in a unit.
+    def of(cls, loop: ForceLoop, period_s: float, **limits: Any) -> Self:
+        """Return the model of a declared loop, lengths in mm, stepped with a period.
 
-        Parameters
-        ----------
-        loop
-            Gains, filter, rate and motor.
-        length
-            Unit of lengths.
-        period_s
-            T; None: the loop states its rate.
-        **limits
-            `speed`, `windup_s`, `travel` and `feed_forward` of the law.
+        `limits` are `speed`, `windup_s`, `travel` and `feed_forward` of the law.
         """
-        if period_s is None:
-            if loop.rate is None:
-                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
-            period_s = 1 / loop.rate.to("Hz")
         law = ForceLaw(
             period_s=period_s,
-            proportional=loop.proportional.to(f"{length}/N"),
-            integral=loop.integral.to(f"{length}/N/s"),
+            proportional=loop.proportional.to("mm/N"),
+            integral=loop.integral.to("mm/N/s"),
             cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
             **limits,
         )
@@ -205,8 +186,8 @@ class LoopModel:
             law,
             lag_s=loop.motor_lag.to("s"),
             delay_s=loop.delay.to("s"),
-            speed=loop.speed.to(f"{length}/s"),
-            acceleration=loop.acceleration.to(f"{length}/s/s"),
+            speed=loop.speed.to("mm/s"),
+            acceleration=loop.acceleration.to("mm/s/s"),
             resolution_n=loop.resolution.to("N"),
         )
 
@@ -222,9 +203,9 @@ class LoopModel:
         )
 
     def matrix(self, stiffness: float) -> FloatArray:
-        """Return what one step does to (x, y, i, c_{n-1} ... c_{n-d}) on a linear skin, without limits and rounding.
+        """Return the matrix of one step of (x, y, i, c_{n-1} ... c_{n-d}) on a linear skin, without limits, rounding.
 
-        Its eigenvalues decide: the loop settles if and only if all lie inside the unit circle.
+        The loop settles if and only if all its eigenvalues lie inside the unit circle.
         """
         law, kept = self.law, self.law.kept(self.law.period_s)
         x, y, integral, *late = np.eye(3 + self.delay_steps)  # each a row: by the state before the step

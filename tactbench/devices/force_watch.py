@@ -1,4 +1,4 @@
-"""What is wrong with a stream of forces: too large, not known, or too old. No input or output; a clock's numbers only.
+"""Problems of a stream of forces: too large, not known, or too old. It has no input or output, and no clock.
 
 An unknown force counts as too large a force.
 """
@@ -17,22 +17,22 @@ from tactbench.devices.guard_messages import Limits, Trigger
 from tactbench.devices.sequence import SequenceCheck
 
 DELAY_WINDOW_NS = 1_000_000_000
-"""The least delay of a device's samples is looked for in this one and the one before (assumed: clocks that differ by
-100 ppm move apart by 0.2 ms meanwhile)."""
+"""Half of the time over which the least delay of a device's samples is taken (assumed: clocks that differ by 100 ppm
+move apart by 0.2 ms in the whole)."""
 MOST_BLOCKS = 50_000
-"""Kept for a rig that does not take them: some 50 s at 1 kHz; then the oldest are dropped."""
+"""Most blocks that wait for a rig: some 50 s at 1 kHz; then the oldest are dropped."""
 _LOOKED_AT = 3
-"""Samples of which two are a touch."""
+"""Number of samples of which two make a touch."""
 _MOST_SOUND = 10_000
-"""Kept for a mean: more than a second of the quickest force sensor, 7 kHz."""
+"""Most samples of a mean: more than a second of the quickest force sensor, 7 kHz."""
 UNRATED_HZ = 100.0
-"""Taken for the rate of a force sensor that states none (assumed: a slow one)."""
+"""Rate of a force sensor that states none (assumed: a slow one)."""
 
 
 def samples(stream: StreamSpec, seconds: float) -> int:
-    """Return how many samples of a force stream come in some seconds; one at least.
+    """Return the number of samples of a force stream in some seconds; one at least.
 
-    A mean is of a count and not of a time: a busy host receives none for a while, and then many at once.
+    A mean is taken over a number, not over a time: a busy host receives none for a while, and then many at once.
     """
     return max(1, round((stream.rate_hz or UNRATED_HZ) * seconds))
 
@@ -41,32 +41,32 @@ Problem = tuple[Trigger, str]
 
 
 class ForceWatch:
-    """Watches one force stream.
+    """Check of the samples of one force stream.
 
     The age of a sample is the time since its receipt and, where the device has a clock of its own, its delay on the way
-    beyond the least of the last second or two: a stream that is held up somewhere is old although it keeps coming. A
-    constant delay cannot be seen. A sample that comes twice, or after newer ones, may be too large or not known, and is
-    otherwise none: it makes no touch and no age.
+    beyond the least of the last second or two: a stream that is held up on its way is old although samples arrive. A
+    constant delay cannot be seen. Only the ceilings and unknown values are checked of a sample that is doubled or late:
+    it makes no touch and no age.
 
     Parameters
     ----------
     stream
-        Channels of kind ``force`` and ``torque`` are looked at.
+        The stream; its channels of kind ``force`` and ``torque`` are checked.
 
     Attributes
     ----------
     blocks
         Samples that are newer than each one before, for the rig.
     order
-        What their numbers say.
+        Order and losses of the samples by their numbers.
     force_n
         Pressing force, less the zero, of the newest sample; NaN: none yet, or no limits.
     sequence, t_ns
-        Number and receipt of that sample; -1 and 0: none yet.
+        Number and time of receipt of that sample; -1 and 0: none yet.
     changed
-        Number of the newest sample that is not in every channel the same as the one before it; -1: none yet.
+        Number of the newest sample that differs from the one before it in any channel; -1: none yet.
     received
-        Samples so far.
+        Number of samples so far.
     """
 
     def __init__(self, stream: StreamSpec) -> None:
@@ -88,9 +88,9 @@ class ForceWatch:
         return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
 
     def mean_n(self, since_ns: int, count: int) -> float:
-        """Return the mean pressing force [N] of the newest so many samples, all of them received after a time.
+        """Return the mean pressing force [N] of the newest `count` samples, all of them received after a time.
 
-        NaN: not so many have come since, or something was wrong with one of them.
+        NaN: fewer were received since, or one of them had a problem.
         """
         while self._sound and (self._sound[0][0] < since_ns or len(self._sound) > count):
             self._sound.popleft()
@@ -101,23 +101,23 @@ class ForceWatch:
         return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else math.inf
 
     def old(self, now_ns: int, limits: Limits) -> Problem | None:
-        """Return what is wrong if nothing newer has come by now."""
+        """Return the problem of a newest sample that is too old; None: it is not."""
         age_s = self.age_s(now_ns)
         if age_s <= limits.force_age_s:
             return None
         return Trigger.FORCE_OLD, f"the newest force is {1e3 * age_s:.1f} ms old, {1e3 * limits.force_age_s:.1f} may be"
 
     def take(self, block: Block, limits: Limits | None, *, travelling: bool = False) -> Problem | None:
-        """Take samples; return the first thing that is wrong with them.
+        """Take samples; return their first problem.
 
         Parameters
         ----------
         block
-            All that came.
+            The samples received.
         limits
-            None: only what needs none is kept up: numbers, times, equal samples.
+            The limits; None: only numbers, times and equal samples are updated.
         travelling
-            Whether the ceiling of travel counts.
+            Whether the ceiling of travel applies.
         """
         newer = self.order(block)
         lost, same = (0, self._same) if newer is None else self._take_newer(newer)
@@ -140,7 +140,7 @@ class ForceWatch:
         return problem
 
     def _take_newer(self, block: Block) -> tuple[int, int]:
-        """Keep up numbers and times; return the most samples lost in a row, and the most that were the same."""
+        """Update numbers and times; return the most samples lost in a row, and the most equal ones."""
         self.blocks.append(block)
         rows = block.data
         numbers = self.sequence + 1 + np.arange(len(rows)) if block.sequence is None else block.sequence
@@ -172,7 +172,7 @@ class ForceWatch:
         return None
 
     def _delayed(self, t_ns: int, device_ns: int) -> int:
-        """Return by how much a sample took longer than the quickest of late [ns]."""
+        """Return the delay of a sample beyond the least one of the last time [ns]."""
         offset = t_ns - device_ns
         if not self._offsets or t_ns - self._offsets[-1][0] > DELAY_WINDOW_NS:
             self._offsets.append((t_ns, offset))
@@ -186,7 +186,7 @@ def _unknown(wrenches: FloatArray, block: Block) -> Problem | None:
         return Trigger.FORCE_NOT_A_NUMBER, "a sample of the force sensor is not a number"
     marks = 0 if block.quality is None else int(np.bitwise_or.reduce(block.quality, axis=None))
     if marks & Quality.SATURATED:
-        return Trigger.FORCE_SATURATED, "the force sensor says that it is at an end of its range"
+        return Trigger.FORCE_SATURATED, "the force sensor reports an end of its range"
     if marks & (Quality.MISSING | Quality.SUSPECT):
         return Trigger.FORCE_FLAGGED, "a sample of the force sensor is flagged as missing or suspect"
     return None

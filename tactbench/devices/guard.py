@@ -1,30 +1,31 @@
-"""The guard of a rig's axes: carries out a rig's commands within limits, and retreats when anything is wrong.
+"""The guard of a rig's axes: it carries out a rig's commands within limits, and retreats when anything is wrong.
 
-It looks at the force and all axes every millisecond, whatever moves. What makes it retreat, and what it refuses, is the
-table of docs/hardware.md, Safety. A retreat halts every axis that moves and sends the pressing axis to its place away
-from the skin. What it promises, of axes that do as they state:
+It reads the force and all axes every millisecond, whatever moves. The table of docs/hardware.md, Safety, lists what
+makes it retreat, and what it refuses. A retreat halts every axis that moves and sends the pressing axis to its place
+away from the skin. For axes that do as they state, the guard guarantees:
 
 - *Steps.* One increment is out at a time, and the next is sent only if a force sample that was taken after the end of
-  the one before is below the ceiling, and is another one in number and value than the sample before it. So the force
-  never exceeds F_c + k (step + corridor) and the noise of one sample, whatever the line's rate and whoever hangs
-  (derived; k the largest stiffness at the ceiling F_c). A line that falls silent lets the axis end one increment.
+  the one before is below the ceiling, and differs in number and value from the sample before it. So the force never
+  exceeds F_c + k (step + corridor) and the noise of one sample, at any baud rate and whichever program hangs (derived;
+  k the largest stiffness at the ceiling F_c). If the line falls silent, the axis ends one increment.
 - *Moves at a speed v*, of any axis: :func:`largest_force_n`.
-- *A rig that hangs or dies* makes the retreat begin within heartbeat_s + reaction.
+- *A rig that hangs or dies*: the retreat begins within heartbeat_s + reaction.
 
-What it cannot promise: anything about people; a force sensor that lies plausibly (:mod:`.press` compares force and
-place); forces that the sensor does not feel, such as the platform against the frame; a retreat or a halt of an axis
-whose controller does not answer, which ends its move by itself; a place, where a controller lost steps.
+It cannot guarantee: anything about people; the force where the force sensor reads plausible wrong values
+(:mod:`.press` compares force and place); forces that the sensor does not feel, such as the platform against the frame;
+a retreat or a halt of an axis whose controller does not answer, which ends its move by itself; a place, where a
+controller lost steps.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, MutableSequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import NoReturn
 
 from tactbench.core.errors import (
     LinkClosed,
@@ -51,28 +52,26 @@ from tactbench.devices.guard_messages import (
 from tactbench.devices.positioner import Positioner, PositionerSilentError
 from tactbench.links.link import Clock
 
-T = TypeVar("T")
-
 FORCE = "force"
-"""What the force sensor is called beside the axes."""
+"""Name of the force sensor beside the axes."""
 LOOK_S = 1e-3
-"""Longest wait between two looks: the sampling period of the force."""
+"""Longest wait for a force sample in one look: its sampling period."""
 ALIVE_S = 0.2
-"""For so long the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
+"""Time for which the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
 AGAIN_S = 0.25
-"""After which a retreat that is not under way is sent again (assumed: above the time of an answer at 9600 baud)."""
+"""Time after which a retreat that is not under way is sent again (assumed: more than an answer at 9600 baud takes)."""
 RETREAT_S = 1.0
-"""Added to the time of the way, or of the force's mean after it, after which a retreat has failed (assumed)."""
+"""Time beyond that of the way, or of the force's mean after it, after which a retreat has failed (assumed)."""
 REFUSED = 3
-"""Refused commands in a row that end the rig's command (assumed)."""
+"""Number of refused commands in a row that makes the guard retreat (assumed)."""
 
 
 def largest_force_n(
     ceiling_n: float, stiffness_n_m: float, speed_m_s: float, acceleration_m_s2: float, reaction: float
 ) -> float:
-    """Return F_c + k v t_r + k v^2/(2 a) [N]: what a move may come to that is stopped at a ceiling (derived).
+    """Return F_c + k v t_r + k v^2/(2 a) [N], the largest force of a move that is stopped at a ceiling F_c (derived).
 
-    With a threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness up to there.
+    With the threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness until then.
     """
     return ceiling_n + stiffness_n_m * speed_m_s * (reaction + speed_m_s / (2 * acceleration_m_s2))
 
@@ -88,16 +87,22 @@ class LocalGuard:
     force
         The force sensor, with one stream; likewise.
     clock
-        That of all.
+        Clock of all devices.
     advance
-        Lets time pass until a nanosecond of the clock; used only where the force sensor's link cannot be waited for.
+        Lets time pass until a nanosecond of the clock; used only where the force sensor's link is gone.
     on_event
         Called with each event.
     interrupted
-        Called while axes are homed: whether they shall stand.
+        Called while axes are homed or retracted; true halts them.
     kept
-        A file that is there from arming until the pressing axis was seen to be clear of the sensor, and says why it is
-        not: the next guard with this file begins with it. None: nothing is kept.
+        A file that exists from arming until the pressing axis is known to be clear of the sensor, and contains the
+        reason; the next guard with this file begins with it. None: no file.
+
+    Attributes
+    ----------
+    force_blocks, motor_blocks, events
+        Samples of the force sensor, states of the pressing axis, and events, until the rig clears them. Force samples
+        that are doubled or late are left out.
     """
 
     def __init__(
@@ -121,8 +126,8 @@ class LocalGuard:
         self._on_event, self._interrupted = on_event, interrupted
         self._watch = ForceWatch(self.force_stream)
         self._limits: Limits | None = None
-        self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
-        self._events: list[Event] = []
+        self.force_blocks, self.motor_blocks = self._watch.blocks, deque[Block](maxlen=MOST_BLOCKS)
+        self.events: list[Event] = []
         self._kept = kept
         self._not_out = kept.read_text(encoding="utf-8") if kept is not None and kept.exists() else ""
         self._counts: Counter[str] = Counter()
@@ -146,10 +151,10 @@ class LocalGuard:
         (stream,) = self._press.streams
         return stream
 
-    # What a rig asks for ----------------------------------------------------------------------------------------------
+    # Requests of a rig ------------------------------------------------------------------------------------------------
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
-        """Ask all devices who they are, and let them sample."""
+        """Identify all devices, and let them sample; return their identities."""
         found = {}
         for name, device in {**self._axes, FORCE: self._force}.items():
             try:
@@ -158,7 +163,7 @@ class LocalGuard:
             except TactbenchError as error:
                 error.message = f"{name}: {error.message}"
                 raise
-        self._say(None, "started")
+        self._record(None, "started")
         return found
 
     def arm(self, limits: Limits) -> Report:
@@ -172,21 +177,16 @@ class LocalGuard:
             If something is not as it must be; nothing was moved, or what was begun has ended. The state is IDLE, or
             FAULT if force or an axis went wrong while homing.
         """
-        if self.state is not GuardState.IDLE:
-            raise GuardRefusesError(f"The guard is in state {self.state}.", hint="Disarm it first.")
         self._check(limits)
-        if not limits.confirmed and (unclear := self._unclear):
-            raise GuardRefusesError(
-                f"The guard does not arm: {unclear}.",
-                hint="An operator has to see that the indenter is clear of the sensor, and to say so.",
-            )
-        self._wait_for_force(limits)
+        self._check_force(limits)
         try:
-            self._keep(f"it was armed at {datetime.now().isoformat(' ', 'seconds')}, and not seen to be out since")
+            self._store_reason(
+                f"it was armed at {datetime.now().isoformat(' ', 'seconds')}, and not seen to be out since"
+            )
         except OSError as error:
+            hint = "Make room, or name another file as `guard_log:` in the rig file."
             raise GuardRefusesError(
-                f"The guard does not arm: it cannot keep that it is armed in {self._kept}: {error}.",
-                hint="Make room, or name another file as `guard_log:` in the rig file.",
+                f"The guard does not arm: {self._kept} is not written: {error}.", hint=hint
             ) from error
         self._not_out = ""
         for name, axis in self._axes.items():
@@ -196,27 +196,28 @@ class LocalGuard:
                 self._home_anew.add(name)
                 if isinstance(error, GuardRefusesError):
                     raise
-                hint = getattr(error, "hint", "")
-                raise GuardRefusesError(f"{name} is not armed: {fault_text(error)}.", hint=hint) from error
+                raise GuardRefusesError(
+                    f"{name} is not armed: {fault_text(error)}.", hint=getattr(error, "hint", "")
+                ) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._refused, self._touched = 0, False
         self._end_sequence = self._watch.sequence
-        # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
-        self._watch.blocks.clear()
-        self._motor_blocks.clear()
+        # The samples of a homing may be those of a minute: to send them would take the time of a beat.
+        self.force_blocks.clear()
+        self.motor_blocks.clear()
         self._beat_ns = self._clock()
-        self._say(None, "armed")
+        self._record(None, "armed")
         return self._report()
 
     def beat(self, beat: Beat) -> Report:
-        """Say that the rig is there, and what shall be done; return at once."""
+        """Note that the rig is alive, and carry out its command; return at once."""
         limits = self._limits
         if self.state is GuardState.ARMED and limits is not None:
             self._counts["beats"] += 1
-            self._see_beat(beat.t_ns, limits)
+            self._check_beat(beat.t_ns, limits)
             self._beat_ns = min(beat.t_ns, self._clock())
         self.look(0.0)
-        # What this look has found stands before the command.
+        # A problem that this look has found goes before the command.
         if self.state is not GuardState.ARMED or limits is None:
             return self._report(f"the guard is in state {self.state}")
         reason, early = self._command(beat, limits)
@@ -225,7 +226,7 @@ class LocalGuard:
         elif reason:
             self._counts["refused"] += 1
             self._refused += 1
-            self._say(None, f"refused in {beat.state or 'no state'}: {reason}")
+            self._record(None, f"refused in {beat.state or 'no state'}: {reason}")
             if self._refused >= REFUSED:
                 self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
         elif beat.command is not CommandKind.NONE:
@@ -233,26 +234,15 @@ class LocalGuard:
         return self._report(reason, early=early)
 
     def advance(self, until_ns: int) -> None:
-        """Look until the clock says so much."""
+        """Look until the clock is at a nanosecond."""
         while (left_ns := until_ns - self._clock()) > 0:
             self.look(min(LOOK_S, 1e-9 * left_ns))
 
-    def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call, but for those that came twice or after newer ones."""
-        return taken(self._watch.blocks)
-
-    def motor_blocks(self) -> list[Block]:
-        """Return all states of the pressing axis since the last call."""
-        return taken(self._motor_blocks)
-
-    def events(self) -> list[Event]:
-        """Return what has happened since the last call."""
-        return taken(self._events)
-
+    @property
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``.
+        """Counts of the drivers, and the guard's ``beats``, ``early``, ``refused``.
 
-        To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
+        The force sensor's also have ``duplicates`` and ``late`` samples, which are dropped, and missing ones, ``gaps``.
         """
         force, order = Counter(self._force.counts), self._watch.order
         force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
@@ -262,19 +252,19 @@ class LocalGuard:
     def disarm(self) -> Report:
         """Retreat, and expect no more beats; a fault is cleared.
 
-        What `Report.not_out` says stays until an operator has confirmed that it is clear, also for the next guard.
+        `Report.not_out` stays until an operator has confirmed that the indenter is clear, also for the next guard.
         """
         self.trip(Trigger.COMMANDED, "disarmed")
         while self.state is GuardState.RETREATING:
             self.look(LOOK_S)
         if self.state is not GuardState.IDLE:
             self.state = GuardState.IDLE
-            self._say(None, "disarmed")
+            self._record(None, "disarmed")
         self._limits, self.trigger = None, None
         return self._report()
 
     def close(self) -> None:
-        """Disarm, and close all devices; once closed, this does nothing."""
+        """Disarm, and close all devices; a second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -288,27 +278,23 @@ class LocalGuard:
     # Looking ----------------------------------------------------------------------------------------------------------
 
     def look(self, timeout_s: float) -> None:
-        """Take what has come, waiting at most so long for a force sample, and act on it."""
-        began_ns = self._clock()  # where this look itself is held up, a beat may wait that nobody has heard yet
+        """Read all devices, waiting at most so long for a force sample, and act on what is wrong."""
+        began_ns = self._clock()  # where this look itself is held up, a beat may wait that was not received yet
         watched = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
-        problem = self._seen(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
+        problem = self._read_devices(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
         limits = self._limits
         if limits is None:
             return
         if problem is not None:
             self.trip(*problem)
-        self._see_beat(began_ns, limits)
+        self._check_beat(began_ns, limits)
         touched = self._into_skin and self._press.moving and self._watch.touched(limits.touch_n)
         if self.state is GuardState.ARMED and touched:
             self._into_skin, self._touched = False, True
             self._halt(self._press)
-            self._say(None, "touch: the axis holds")
+            self._record(None, "touch: the axis holds")
         if self.state is GuardState.RETREATING:
-            self._carry_on()
-
-    @property
-    def _moving(self) -> bool:
-        return any(axis.moving for axis in self._axes.values())
+            self._continue_retreat()
 
     @property
     def _retracted(self) -> bool:
@@ -316,41 +302,34 @@ class LocalGuard:
 
     @property
     def _unclear(self) -> str:
-        """Why an operator has to see that the indenter is clear of the sensor; empty: it needs not."""
-        here = [
-            name
-            for name, axis in self._axes.items()
-            if axis.facts.homes_here and (name in self._home_anew or not axis.homed)
-        ]
+        """Reason why an operator has to see that the indenter is clear of the sensor; empty: none."""
+        unhomed = self._home_anew | {name for name, axis in self._axes.items() if not axis.homed}
+        here = [name for name, axis in self._axes.items() if axis.facts.homes_here and name in unhomed]
         return self._not_out or (f"{', '.join(here)} is homed where it stands" if here else "")
 
-    def _see_beat(self, now_ns: int, limits: Limits) -> None:
+    def _check_beat(self, now_ns: int, limits: Limits) -> None:
         age_s = 1e-9 * (now_ns - self._beat_ns)
         if age_s > limits.heartbeat_s:
             self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be")
 
-    def _seen(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
-        """Take what all devices have sent; return the first thing that is wrong, of the force first."""
+    def _read_devices(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
+        """Read all devices; return the first problem, that of the force first."""
         problem = self._take_force(timeout_s, limits, travelling=travelling)
-        for name, axis in self._axes.items():
-            found = self._take_axis(name, axis, limits)
-            problem = problem or found
-        return problem
+        problems = [problem, *(self._take_axis(name, axis, limits) for name, axis in self._axes.items())]
+        return next(filter(None, problems), None)
 
     def _take_force(self, timeout_s: float, limits: Limits | None, *, travelling: bool = True) -> Problem | None:
         if FORCE in self._lost:
             self._advance(self._clock() + round(1e9 * timeout_s))
             return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
-        watch, problem = self._watch, None
+        watch = self._watch
         try:
             blocks = self._force.read(timeout_s)
         except Exception as error:
             self._lost.add(FORCE)
             return Trigger.FORCE_LOST, fault_text(error)
-        for block in blocks:
-            found = watch.take(block, limits, travelling=travelling)
-            problem = problem or found
-        return problem or (None if limits is None else watch.old(self._clock(), limits))
+        problems = [watch.take(block, limits, travelling=travelling) for block in blocks]
+        return next(filter(None, problems), None if limits is None else watch.old(self._clock(), limits))
 
     def _take_axis(self, name: str, axis: Positioner, limits: Limits | None) -> Problem | None:
         if name in self._lost:
@@ -367,43 +346,39 @@ class LocalGuard:
             silent = isinstance(error, PositionerSilentError | LinkTimeout)
             return Trigger.AXIS_SILENT if silent else Trigger.AXIS_FAULT, text
         if axis is self._press:
-            self._motor_blocks += blocks
+            self.motor_blocks += blocks
             if was_moving and not axis.moving:
                 self._end_sequence = self._watch.sequence
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
-            return Trigger.AXIS_FAULT, f"{name}: the controller says {axis.state.problem}"
+            return Trigger.AXIS_FAULT, f"{name}: the controller reports {axis.state.problem}"
         return None
 
     # Commands ---------------------------------------------------------------------------------------------------------
 
     def _command(self, beat: Beat, limits: Limits) -> tuple[str, bool]:
-        """Carry out what a beat asks for; else return why not, and whether it only is too early."""
-        match beat.command:
-            case CommandKind.NONE:
-                return "", False
-            case CommandKind.RETREAT:
-                self.trip(Trigger.COMMANDED, "the rig has commanded it")
-                return "", False
-            case CommandKind.STOP:
-                self._into_skin = False
-                for axis in self._axes.values():
-                    if axis.moving:
-                        self._halt(axis)
-                return "", False
+        """Carry out the command of a beat; return the reason if it is refused, and whether it only is too early."""
+        if beat.command is CommandKind.NONE:
+            return "", False
+        if beat.command is CommandKind.RETREAT:
+            self.trip(Trigger.COMMANDED, "the rig has commanded it")
+            return "", False
+        if beat.command is CommandKind.STOP:
+            self._into_skin = False
+            self._halt(*(axis for axis in self._axes.values() if axis.moving))
+            return "", False
         if beat.force_sequence > self._watch.sequence:
             return f"force sample {beat.force_sequence} has not come", False
-        reason = self._travel_reason(beat) if beat.command is CommandKind.TRAVEL else self._press_reason(beat, limits)
-        if reason:
+        travels, press = beat.command is CommandKind.TRAVEL, self._press
+        if reason := self._travel_reason(beat) if travels else self._press_reason(beat, limits):
             return reason, False
-        if self._moving:
+        if any(axis.moving for axis in self._axes.values()):
             return "an axis is moving", True
         if min(beat.force_sequence, self._watch.changed) <= self._end_sequence:
             return "no force sample is known from after the last move", True
         self._into_skin = self._touched = False
-        press = self._press
         try:
-            if beat.command is CommandKind.TRAVEL:
+            if travels:
                 for name, target in beat.targets.items():
                     self._others[name].move_to(target)
             elif beat.command is CommandKind.STEP:
@@ -411,7 +386,7 @@ class LocalGuard:
             else:
                 self._into_skin = press.state is not None and beat.position_m > press.state.target
                 press.move_to(beat.position_m, beat.speed_m_s)
-        except Exception as error:  # of the axis' driver: whatever it is, it was not carried out
+        except Exception as error:  # of the axis' driver, whatever it is: the command was not carried out
             return fault_text(error), False
         return "", False
 
@@ -421,33 +396,33 @@ class LocalGuard:
         for name, target in beat.targets.items():
             low, high = self._others[name].facts.limits if name in self._others else (math.nan, math.nan)
             if not low <= target <= high:
-                return f"the target {target:g} m of {name} is outside its travel {low:g} to {high:g} m"
+                return f"the target of {name} is outside its travel"
         return ""
 
     def _press_reason(self, beat: Beat, limits: Limits) -> str:
-        """Return why the pressing axis may not move; empty: it may."""
+        """Return the reason why the pressing axis may not move; empty: it may."""
         state, force_n = self._press.state, self._watch.force_n
         if state is None or math.isnan(state.target):
             return f"the target of {self._name} is not known"
-        is_step = beat.command is CommandKind.STEP
+        is_step, (low, high) = beat.command is CommandKind.STEP, limits.travel_m
         target_m = state.target + beat.distance_m if is_step else beat.position_m
-        low, high = limits.travel_m
         if not low <= target_m <= high:
             return f"the target {target_m:g} m is outside the travel {low:g} to {high:g} m"
         if is_step:
             resolution = self._press.facts.resolution
-            longest_m = (round(limits.step_m / resolution) + 0.5) * resolution
-            return "" if abs(beat.distance_m) < longest_m else f"a step of {beat.distance_m:g} m is longer than allowed"
+            too_long = not abs(beat.distance_m) < (round(limits.step_m / resolution) + 0.5) * resolution
+            return f"a step of {beat.distance_m:g} m is longer than allowed" if too_long else ""
         if not 0.0 < beat.speed_m_s <= limits.speed_m_s * (1 + 1e-9):
             return f"a speed of {beat.speed_m_s:g} m/s is not within {limits.speed_m_s:g} m/s"
         if target_m > state.target and not force_n < limits.touch_n:
             return f"it would move into the skin in contact, at {force_n:.3f} N"
         return ""
 
-    def _halt(self, axis: Positioner) -> None:
-        """Halt an axis; what fails of it becomes a retreat."""
+    def _halt(self, *axes: Positioner) -> None:
+        """Halt axes; retreat if that fails."""
         try:
-            axis.halt()
+            for axis in axes:
+                axis.halt()
         except Exception as error:
             self.trip(Trigger.AXIS_FAULT, fault_text(error))
 
@@ -461,12 +436,12 @@ class LocalGuard:
         self._into_skin = False
         self._began_ns = self._clock()
         self._send_retreat()
-        self._say(trigger, text)
+        self._record(trigger, text)
 
     def _send_retreat(self) -> None:
         self._sent_ns = self._clock()
         commands = {name: axis.halt for name, axis in self._others.items() if axis.moving}
-        # A place that is not known any more is no aim: it may be on the other side.
+        # An axis that has lost its home has no known way to its place of retreat.
         commands[self._name] = self._press.retreat if self._press.homed else self._press.halt
         for name, command in commands.items():
             if name in self._lost:
@@ -478,42 +453,38 @@ class LocalGuard:
             except Exception:  # it is sent again
                 continue
 
-    def _carry_on(self) -> None:
-        """See whether the pressing axis is out and the others stand; send it again, or end in a fault.
+    def _continue_retreat(self) -> None:
+        """End the retreat if the pressing axis is out and the others stand, or it has failed; send it again if needed.
 
-        It is out where it stands at its place of retreat and the mean force since is near zero.
+        The pressing axis is out where it stands at its place of retreat and the mean force since is near zero.
         """
         press, now_ns, limits = self._press, self._clock(), self._limits
         assert limits is not None
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         fresh = press.state is not None and press.state.t_ns > self._sent_ns
-        # An axis that is lost while it moves ends its move by itself, which nobody sees.
+        # An axis that is lost while it moves ends its move unobserved.
         lost = sorted(name for name in self._lost - {FORCE} if name == self._name or self._axes[name].moving)
         there = not press.moving and self._retracted and fresh
         self._there_ns = (self._there_ns or now_ns) if there else 0
         force_n = self._watch.mean_n(self._there_ns, samples(self.force_stream, limits.clear_s)) if there else math.nan
-        out = abs(force_n) < limits.clear_n
-        others = any(axis.moving and name not in self._lost for name, axis in self._others.items())
-        if lost and not others and (there or self._name in lost):
+        stand = not any(axis.moving and name not in self._lost for name, axis in self._others.items())
+        if stand and lost and (there or self._name in lost):
             self._end(Trigger.AXIS_LOST, f"stand clear: {', '.join(lost)} ends its last move and holds there")
-        elif out and not others:
+        elif stand and abs(force_n) < limits.clear_n:
             self._end(None, f"out after {took}")
-        elif there and not others:
+        elif stand and there:
             if FORCE in self._lost or now_ns > self._there_ns + 1e9 * (limits.clear_s + RETREAT_S):
-                known = "is not known" if math.isnan(force_n) else f"is {force_n:.2f} N"
-                self._end(
-                    Trigger.NOT_CLEAR,
-                    f"NOT KNOWN TO BE OUT: at its place of retreat after {took}, and the force {known}: stand clear, "
-                    "and see what the indenter touches",
-                )
+                where = f"at its place of retreat after {took}, and the force is {force_n:.2f} N"
+                text = f"NOT KNOWN TO BE OUT: {where}: stand clear, and see what the indenter touches"
+                self._end(Trigger.NOT_CLEAR, text)
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
-            where = "nobody knows where" if math.isnan(press.position) else f"last seen at {press.position:g} m"
             power = "left under power, since it may fall without"
             if press.facts.holds_unpowered:
                 with suppress(LinkError, RigError):
                     press.disable()
                     power = "power taken off"
-            self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: not out after {took}, {where}; {power}: stand clear")
+            where = f"not out after {took}, last read at {press.position:g} m"
+            self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: {where}; {power}: stand clear")
         elif not press.moving and now_ns - self._sent_ns > 1e9 * AGAIN_S:
             self._send_retreat()
 
@@ -523,12 +494,12 @@ class LocalGuard:
         if failed is not None:
             self._home_anew.update(self._lost, [self._name])
             self._not_out = text
-        with suppress(OSError):  # then the file says that it was armed
-            self._keep(self._not_out)
-        self._say(failed, text)
+        with suppress(OSError):  # the file then still contains that it was armed
+            self._store_reason(self._not_out)
+        self._record(failed, text)
 
-    def _keep(self, text: str) -> None:
-        """Keep for the next guard why the pressing axis is not known to be out; empty: it is."""
+    def _store_reason(self, text: str) -> None:
+        """Store for the next guard the reason why the pressing axis is not known to be out; empty: it is out."""
         if self._kept is not None and text:
             self._kept.write_text(text, encoding="utf-8")
         elif self._kept is not None:
@@ -537,32 +508,38 @@ class LocalGuard:
     # Arming -----------------------------------------------------------------------------------------------------------
 
     def _check(self, limits: Limits) -> None:
-        """Raise GuardRefusesError where limits and axes contradict each other."""
-        facts, channels = self._press.facts, self.force_stream.channels
-        low, high = limits.travel_m
-        uninterruptible = [name for name, axis in self._axes.items() if not axis.facts.interruptible]
+        """Raise GuardRefusesError where state, limits and axes do not allow to arm."""
+        facts, (low, high), zeros = self._press.facts, limits.travel_m, len(limits.zero)
         endless = [name for name, axis in self._axes.items() if not all(map(math.isfinite, axis.facts.limits))]
+        stated = (facts.retreat, facts.retreat_speed, facts.speed, facts.acceleration)
         for wrong, problem in (
+            (self.state is not GuardState.IDLE, f"it is in state {self.state}, and is disarmed first"),
             (endless, f"no ends of travel are stated for {', '.join(endless)}"),
-            (uninterruptible, f"moves of {', '.join(uninterruptible)} cannot be interrupted"),
             (
-                not all(map(math.isfinite, (facts.retreat, facts.retreat_speed, facts.speed, facts.acceleration))),
-                f"{self._name} does not state retreat, retreat speed, speed and acceleration",
+                not all(axis.facts.interruptible for axis in self._axes.values()),
+                "moves of an axis cannot be interrupted",
             ),
-            (not facts.corridor > 0, f"{self._name} does not state its corridor"),
+            (
+                not all(map(math.isfinite, stated)) or not facts.corridor > 0,
+                f"{self._name} does not state retreat, retreat speed, speed, acceleration and corridor",
+            ),
             (not facts.limits[0] <= low < high <= facts.limits[1], "the travel is not within the axis' ends"),
             (not low <= facts.retreat < high, "the place to retreat to is not within the travel, away from its end"),
             (facts.corridor > limits.step_m, "the axis' corridor is longer than a step"),
-            (len(limits.zero) != len(channels), f"the force has {len(channels)} channels and {len(limits.zero)} zeros"),
+            (
+                zeros != len(self.force_stream.channels),
+                f"there are {zeros} zeros, not one for each channel of the force",
+            ),
             (self._lost, "a device is gone: close the guard and open a new one"),
+            (not limits.confirmed and self._unclear, f"{self._unclear}; an operator has to see that it is clear"),
         ):
             if wrong:
                 raise GuardRefusesError(f"The guard does not arm: {problem}.", hint="See docs/hardware.md, Safety.")
 
-    def _wait_for_force(self, limits: Limits) -> None:
+    def _check_force(self, limits: Limits) -> None:
         """Watch the unloaded force for a while; raises GuardRefusesError."""
         before = -1
-        while self._watch.received != before:  # what has waited since nobody looked
+        while self._watch.received != before:  # samples that have waited since the last look
             before = self._watch.received
             self._take_force(0.0, None)
         problem: Problem | None = None
@@ -580,7 +557,7 @@ class LocalGuard:
             )
 
     def _make_ready(self, name: str, axis: Positioner, limits: Limits) -> None:
-        """Home an axis that is not homed, under watch, give it power, and retract the pressing one."""
+        """Home an axis that is not homed, while the force is watched, enable it, and retract the pressing one."""
         problem: Problem | None = None
 
         def stop() -> bool:
@@ -589,7 +566,7 @@ class LocalGuard:
             return problem is not None
 
         if name in self._home_anew or not (axis.homed or axis.find_home()):
-            self._say(None, f"homing {name}")
+            self._record(None, f"homing {name}")
             try:
                 axis.home(stop)
             except Exception as error:
@@ -607,7 +584,7 @@ class LocalGuard:
         press.retreat()
         sent_ns = self._clock()
         while press.moving or not self._retracted or press.state is None or press.state.t_ns <= sent_ns:
-            problem = self._seen(LOOK_S, limits, travelling=True) or self._interruption()
+            problem = self._read_devices(LOOK_S, limits, travelling=True) or self._interruption()
             if problem is None and self._clock() > deadline_ns:
                 problem = Trigger.HOMING, "it has not come to its place of retreat in its time"
             if problem is not None:
@@ -617,20 +594,17 @@ class LocalGuard:
         return (Trigger.TERMINATED, "interrupted") if self._interrupted() else None
 
     def _homing_failed(self, name: str, trigger: Trigger, text: str) -> NoReturn:
-        stands = self._stands(name)
+        outcome = f"{name} stands where it was homed or retracted"
+        if not self._stands(name):
+            outcome = f"{name} was halted while it was homed or retracted, and is not known to stand: stand clear"
+            self._not_out = outcome
         self.state, self.trigger = GuardState.FAULT, Trigger.HOMING
-        self._say(Trigger.HOMING, f"{name}: {trigger}: {text}")
-        if not stands:
-            self._not_out = f"{name} was halted while it was homed or retracted, and is not known to stand: stand clear"
-        raise GuardRefusesError(
-            f"{name} stands where it was homed or retracted: {trigger}: {text}"
-            if stands
-            else f"{self._not_out}: {trigger}: {text}",
-            hint="See what the indenter touches; then disarm, and arm again.",
-        )
+        self._record(Trigger.HOMING, f"{name}: {trigger}: {text}")
+        hint = "See what the indenter touches; then disarm, and arm again."
+        raise GuardRefusesError(f"{outcome}: {trigger}: {text}", hint=hint)
 
     def _stands(self, name: str) -> bool:
-        """Halt an axis, again and again, and return whether it says the same place for a while."""
+        """Halt an axis repeatedly; return whether it reports the same place for a while."""
         axis, place = self._axes[name], math.nan
         since_ns = begin_ns = again_ns = self._clock()
         while self._clock() < begin_ns + 1e9 * RETREAT_S:
@@ -646,11 +620,11 @@ class LocalGuard:
                 return True
         return False
 
-    # Saying -----------------------------------------------------------------------------------------------------------
+    # Events and reports -----------------------------------------------------------------------------------------------
 
-    def _say(self, trigger: Trigger | None, text: str) -> None:
+    def _record(self, trigger: Trigger | None, text: str) -> None:
         event = Event(self._clock(), self.state, trigger, self._watch.force_n, self._press.position, text)
-        self._events.append(event)
+        self.events.append(event)
         self._on_event(event)
 
     def _report(self, reason: str = "", *, early: bool = False) -> Report:
@@ -660,7 +634,7 @@ class LocalGuard:
             state=self.state,
             reason=reason,
             early=early,
-            moving=self._moving,
+            moving=any(axis.moving for axis in self._axes.values()),
             position_m=self._press.position,
             target_m=math.nan if state is None else state.target,
             positions={name: axis.position for name, axis in self._axes.items()},
@@ -674,13 +648,6 @@ class LocalGuard:
 
 
 def retreat_seconds(press: Positioner) -> float:
-    """Return within what time a retreat from anywhere has ended."""
+    """Return the longest time of a retreat [s], from the far end of the travel."""
     low, high = press.facts.limits
     return (high - low) / press.facts.retreat_speed + RETREAT_S
-
-
-def taken(kept: MutableSequence[T]) -> list[T]:
-    """Empty a list, and return what was in it."""
-    found = list(kept)
-    kept.clear()
-    return found

@@ -21,105 +21,105 @@ from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 
 SILENT_S = 0.5
-"""After which a controller is said not to answer (assumed)."""
+"""Timeout for an answer of a controller (assumed)."""
 SETTLE_S = 0.5
-"""Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
+"""Time beyond that of a move by its speed and acceleration, after which the move has failed (assumed)."""
 HOMING_S = 60.0
-"""Homing takes no longer (assumed)."""
+"""Timeout for homing (assumed)."""
 HALTS = 2
-"""How often an axis is halted in the usual way before :meth:`Positioner.halt_harder` (assumed)."""
+"""Number of halts before :meth:`Positioner.halt_harder` (assumed)."""
 FASTER = 1.5
-"""How much faster than it states an axis may seem to move: two positions further apart are not of one way (assumed)."""
+"""Factor over its stated speed at which an axis may seem to move; two positions further apart are no move (assumed)."""
 
 
 class PositionerError(RigError):
-    """An axis or its controller does not do what it was asked for."""
+    """An axis or its controller does not carry out a command."""
 
 
 class PositionerSilentError(PositionerError):
-    """The controller does not answer, or did not answer a command; whether it was carried out is not known."""
+    """The controller does not answer; whether it has carried out the last command is not known."""
 
 
 class NotReadyError(PositionerError):
-    """A move was asked for that is not allowed now, or at all; nothing was sent."""
+    """The move is not allowed now, or at all; nothing was sent."""
 
 
 @dataclass(frozen=True)
 class PositionerFacts:
-    """What an axis states of itself; positions in m (or rad), those of a pressing axis positive into the skin."""
+    """Properties that an axis states; positions in m (or rad), those of a pressing axis positive into the skin."""
 
     limits: tuple[float, float]
-    """Least and greatest position, kept by the controller too; NaN: none, and it is never moved."""
+    """Least and greatest position, which the controller keeps as well; NaN: not stated, and it is never moved."""
     resolution: float
     """Least step."""
     corridor: float
-    """How far from its target a finished move may be."""
+    """Largest distance from its target at which a move ends."""
     speed: float
     """Largest speed of a move."""
     acceleration: float
-    """Of braking."""
+    """Acceleration of braking."""
     stop_latency_s: float
-    """From the call of :meth:`Positioner.halt` or :meth:`~Positioner.retreat` to the beginning of braking, at most."""
+    """Longest time from the call of :meth:`Positioner.halt` or :meth:`~Positioner.retreat` to the begin of braking."""
     interruptible: bool
     """Whether `halt` and `retreat` end a move that is under way."""
     holds_unpowered: bool
-    """Whether it stays where it is without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    """Whether it keeps its place without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
     homes_here: bool = False
-    """Whether homing takes the place at which it stands for its home: it cannot notice that it stands in the skin."""
+    """Whether homing takes the present place for the home, even one in the skin."""
     retreat: float = math.nan
-    """Where it is away from the skin; NaN: it retreats by standing still."""
+    """Position away from the skin; NaN: it retreats by a halt."""
     retreat_speed: float = math.nan
 
     @property
     def near(self) -> float:
-        """How near to a place counts as there."""
+        """Largest distance from a place that counts as being there."""
         return max(self.corridor, 2.0 * self.resolution)
 
     def seconds(self, distance: float, speed: float) -> float:
-        """Return how long a move takes at most."""
+        """Return the longest time of a move [s]."""
         return abs(distance) / speed + 2.0 * speed / self.acceleration + SETTLE_S
 
 
 @dataclass(frozen=True)
 class PositionerState:
-    """What was last read of an axis."""
+    """State of an axis, as its controller reported it."""
 
     t_ns: int
-    """When the position's answer came, on the host's clock."""
+    """Time at which the position was received, on the host's clock."""
     position: float
     target: float = math.nan
     """NaN: not known."""
     current_a: float = math.nan
     """Without sign; NaN: not known."""
     problem: str = ""
-    """What the controller reports that must end a press (current limit, deviation); empty: nothing."""
+    """Reported condition that must end a press (current limit, deviation); empty: none."""
 
 
 class PositionerOptions(Options):
-    """What a rig file says of any axis; a subclass has the options of its own controller."""
+    """Options of any axis in a rig file; a subclass adds those of its controller."""
 
     lower_m: float | None = None
-    """Ends of travel, kept by the controller and by the driver; without them the axis can be watched, not moved."""
+    """Ends of travel, kept by the controller and by the driver; without them the axis can be read, not moved."""
     upper_m: float | None = None
     home_m: float = 0.0
-    """What the place is called that homing finds."""
+    """Position of the place that homing finds."""
     speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Of moves."""
+    """Speed of moves."""
     acceleration_m_s2: float | None = Field(default=None, gt=0.0)
-    """Of starting and braking."""
+    """Acceleration of starting and braking."""
     corridor_m: float | None = Field(default=None, gt=0.0)
-    """Around a target, within which a move has ended: well below the shortest move."""
+    """Distance from its target within which a move has ended: well below the shortest move."""
     retreat_m: float | None = None
-    """Where it goes to be away from the sensor."""
+    """Position away from the sensor."""
     retreat_speed_m_s: float | None = Field(default=None, gt=0.0)
     orientation: Literal["horizontal", "vertical"] | None = None
-    """How the axis stands; this and, of a vertical one, the next two must be stated before anything presses."""
+    """Direction of the axis; this and, of a vertical one, the next two must be stated before anything presses."""
     brake: bool | None = None
     """Whether a brake holds it without power."""
     counterweight: bool | None = None
-    """Whether a counterweight or spring does."""
+    """Whether a counterweight or spring holds it without power."""
     peak_force_n: float | None = Field(default=None, gt=0.0)
-    """The largest force that its drive can exert: the last bound where the force sensor lies."""
+    """Largest force that its drive can exert: the last bound where the force sensor reads wrong values."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -140,28 +140,28 @@ class PositionerOptions(Options):
 
     @property
     def force_source(self) -> str:
-        """Where :attr:`largest_force_n` comes from; a subclass whose driver sends a limit says so."""
+        """Source of :attr:`largest_force_n`; that of a subclass whose driver sends a limit is another."""
         return "unknown" if self.largest_force_n is None else "declared"
 
     @property
     def holds_unpowered(self) -> bool:
-        """Whether it stays where it is without power; False where that is not known."""
+        """Whether it keeps its place without power; False where that is not known."""
         return self.orientation == "horizontal" or bool(self.brake) or bool(self.counterweight)
 
     def homes_towards(self) -> int:
-        """Return the sign of the direction in which homing moves; 0: it does not, or that is not known."""
+        """Return the sign of the direction in which homing moves; 0: it does not move, or that is not known."""
         return 0
 
 
 class Positioner(Driver):
-    """One axis.
+    """Driver of one axis.
 
-    Nothing but :meth:`home` and the moves lets it move, and nothing but :meth:`enable` and :meth:`home` gives it power.
-    :meth:`home`, :meth:`enable` and :meth:`disable` wait for their end, within a bound. :meth:`move_to`,
-    :meth:`move_by`, :meth:`halt` and :meth:`retreat` return at once; :meth:`update` carries them on, until
-    :attr:`moving` is false. `halt` and `retreat` replace a move that is under way; the other moves are refused then.
+    Only :meth:`home` and the moves let it move, and only :meth:`enable` and :meth:`home` give it power.
+    :meth:`home`, :meth:`enable` and :meth:`disable` return at their end, within a bound. :meth:`move_to`,
+    :meth:`move_by`, :meth:`halt` and :meth:`retreat` return at once; :meth:`update` is called until :attr:`moving` is
+    false. `halt` and `retreat` replace a move that is under way; the other moves are refused then.
 
-    What goes wrong raises in the call that notices it: PositionerSilentError, another PositionerError, or a LinkError.
+    The call that detects a failure raises PositionerSilentError, another PositionerError, or a LinkError.
 
     As a device of a rig an axis has one stream, `motor`: position, current and target, once per state that was read.
     A subclass has the abstract methods and the class attributes. It calls :meth:`check_move` before it sends a move,
@@ -182,7 +182,7 @@ class Positioner(Driver):
     def __init__(self, settings: DriverSettings) -> None:
         self.facts = self.facts_of(read_options(self.options_kind, settings.options, self.device))
         self.state: PositionerState | None = None
-        """What was last read; None: nothing yet."""
+        """The last state; None: none was read yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
         self._goal, self._nearest, self._due_ns, self._halts, self._fastest = math.nan, math.inf, 0, 0, 0.0
@@ -190,16 +190,16 @@ class Positioner(Driver):
         self._rest = self._came = b""
         self._asked_ns: int | None = None
         self._read_ns = 0
-        """When lines were last read."""
+        """Time at which lines were last read."""
         super().__init__(settings)
         self.homed = False
-        """Whether positions mean anything, and limits hold."""
+        """Whether positions are known, and limits hold."""
         self.enabled = False
-        """Whether it has power, by what is known now."""
+        """Whether it has power, as far as is known."""
 
     @classmethod
     def facts_of(cls, options: Any) -> PositionerFacts:
-        """Return what an axis with these options states of itself; nothing is opened."""
+        """Return the properties of an axis with these options; nothing is opened."""
         return PositionerFacts(
             limits=(_or(options.lower_m, math.nan), _or(options.upper_m, math.nan)),
             resolution=cls.resolution_m,
@@ -213,7 +213,7 @@ class Positioner(Driver):
             retreat_speed=_or(options.retreat_speed_m_s, math.nan),
         )
 
-    # What a subclass does ---------------------------------------------------------------------------------------------
+    # Methods of a subclass --------------------------------------------------------------------------------------------
 
     @abstractmethod
     def home(self, stop: Callable[[], bool] = lambda: False) -> None:
@@ -222,11 +222,11 @@ class Positioner(Driver):
         Parameters
         ----------
         stop
-            Called repeatedly while it moves; true: stand at once and raise PositionerError.
+            Called repeatedly while it moves; true: halt at once and raise PositionerError.
         """
 
     def enable(self) -> None:
-        """Give it power; it holds its place. Nothing is sent, unless a subclass does."""
+        """Give it power; it holds its place. A subclass sends the command, if there is one."""
         self.enabled = True
 
     @abstractmethod
@@ -239,25 +239,25 @@ class Positioner(Driver):
 
     @abstractmethod
     def halt(self) -> None:
-        """Begin to brake and hold, whatever is under way."""
+        """Begin to brake and hold; this replaces any move."""
 
     def halt_harder(self) -> None:
-        """Let it stand by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is none."""
+        """Halt by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is none."""
         raise PositionerError(f"It was halted {HALTS} times, and goes on.", hint="Cut its supply.")
 
     @abstractmethod
     def update(self, timeout_s: float = 0.0) -> None:
-        """Carry on what is under way, waiting at most `timeout_s` for the controller; read the state."""
+        """Read the state and continue moves, waiting at most `timeout_s` for the controller."""
 
     def retreat(self) -> None:
-        """Halt, and once it stands move to the place away from the skin, if there is one; whatever is under way."""
+        """Halt, and at rest move to the place away from the skin, if there is one; this replaces any move."""
         self.halt()
         self._retreats = math.isfinite(self.facts.retreat)
 
     def find_home(self) -> bool:
-        """Ask the controller whether it is homed already, and set :attr:`homed` then: after a restart of this program.
+        """Return whether the controller is homed already, after a restart of this program; set :attr:`homed` then.
 
-        False, and nothing asked, unless a subclass knows how.
+        False here; a subclass queries its controller.
         """
         return False
 
@@ -265,12 +265,12 @@ class Positioner(Driver):
         """Read back the limits that the controller must keep; raises PositionerError if it has others."""
 
     def rescue(self, within_s: float | None) -> float:
-        """Retreat with a controller that another process had, without set-up or homing; return the position at the end.
+        """Retreat with a controller that another process had, without set-up or homing; return the last position.
 
         Parameters
         ----------
         within_s
-            The time for the way; None: stand at once, wherever it is.
+            Timeout for the way; None: halt at once, at any place.
 
         Raises
         ------
@@ -290,15 +290,15 @@ class Positioner(Driver):
                 self.retreat()
             if not self.moving:
                 return self.position
-        raise PositionerSilentError(f"The axis was sent away and is at {self.position:g} m after {within_s:.1f} s.")
+        raise PositionerSilentError(f"The retreat has not ended within {within_s:.1f} s, at {self.position:g} m.")
 
-    # What a subclass calls --------------------------------------------------------------------------------------------
+    # Calls of a subclass ----------------------------------------------------------------------------------------------
 
     def begin(self, target: float = math.nan, speed: float | None = None) -> None:
-        """Note that a move to a target was sent, at a speed (None: not told); it has a deadline from now on.
+        """Note that a move to a target was sent, at a speed (None: that of the facts), and set its deadline.
 
-        That is what its way takes, and later as long as it comes nearer. NaN: it was halted, and stands somewhere;
-        infinity: it is being homed, until the next call of this method.
+        The deadline is the time of the way, and is extended while the axis comes nearer. The target NaN stands for a
+        halt, infinity for homing, until the next call of this method.
         """
         facts, halted = self.facts, math.isnan(target)
         if not (halted and self._fastest):
@@ -320,11 +320,11 @@ class Positioner(Driver):
         current_a: float = math.nan,
         problem: str = "",
     ) -> None:
-        """Note an answer: when and where, and whether the controller says that it stands; more where it says more.
+        """Note an answer: its time, the position, whether the controller reports that the axis is idle, and the rest.
 
-        A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
-        A halt has ended when it stands and the position is that of the answer before. What is homed and goes on after
-        the time of braking is halted again.
+        A move ends when the axis is idle at its target; an idle axis elsewhere has not begun. A halt ends when it is
+        idle and the position is that of the answer before. A homed axis that moves on after the time of braking is
+        halted again.
         """
         last, halted, facts = self.position, math.isnan(self._goal), self.facts
         if target is None:
@@ -343,10 +343,10 @@ class Positioner(Driver):
             self._retreats = retreats
 
     def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
-        """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
+        """Send a question on a ByteLink, unless an answer is outstanding; return the lines received.
 
-        The caller calls :meth:`answered` with the answer. An empty question asks nothing, and waits for nothing. Raises
-        PositionerSilentError if an answer takes `SILENT_S`.
+        The caller calls :meth:`answered` after the answer. An empty question is not sent, and has no answer. Raises
+        PositionerSilentError if an answer takes longer than `SILENT_S`.
         """
         unread_s = 1e-9 * (self.clock() - self._read_ns)
         if question and self._asked_ns is None:
@@ -368,20 +368,20 @@ class Positioner(Driver):
         return lines
 
     def answered(self) -> None:
-        """Note that the answer has come: the next call of :meth:`lines` asks again."""
+        """Note that the answer was received: the next call of :meth:`lines` sends its question."""
         self._asked_ns = None
 
     def finish(self, stop: Callable[[], bool]) -> None:
-        """Wait for the end of a move; halts and raises PositionerError if `stop` says so, or it lasts too long."""
+        """Wait for the end of a move; halts and raises PositionerError if `stop` returns true, or it lasts too long."""
         while self.moving:
             self.update(0.05)
             self._end_in_time()
             if stop():
                 self.halt()
-                raise PositionerError("The axis was told to stand.")
+                raise PositionerError("The axis was halted.")
 
     def _end_in_time(self) -> None:
-        """Raise PositionerError for a move that has not ended in its time; what was halted is seen to by `see`."""
+        """Raise PositionerError for a move that has not ended in its time; :meth:`see` repeats halts."""
         if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
             self._due_ns = self.clock() + round(1e9 * SETTLE_S)
             raise PositionerError(
@@ -391,19 +391,19 @@ class Positioner(Driver):
             )
 
     def note(self, state: PositionerState) -> None:
-        """Keep a state that was read.
+        """Store a state that was read.
 
-        A position further from the last one than it can have gone since is kept only with a second one like it.
+        A position further from the last one than it can have moved since is ignored once.
 
         Raises
         ------
         PositionerError
-            If so: it has lost its place, and is no longer homed.
+            If a second such position follows: the axis has lost its place, and is no longer homed.
         """
         last, facts, far = self.state, self.facts, False
         if last is not None and self.homed and self.enabled:
-            # Each question is sent after the answer before: no more time has passed between the two places than since
-            # the last answer but one.
+            # Each question is sent after the answer before: between the two positions at most the time since the last
+            # answer but one has passed.
             most = FASTER * max(self._fastest, facts.speed) * 1e-9 * (state.t_ns - self._before_ns)
             far = abs(state.position - last.position) > most + facts.near
         if far and not self._odd:
@@ -437,11 +437,11 @@ class Positioner(Driver):
             if wrong:
                 raise NotReadyError(problem, hint=hint)
 
-    # What they have in common -----------------------------------------------------------------------------------------
+    # As a device ------------------------------------------------------------------------------------------------------
 
     @property
     def moving(self) -> bool:
-        """Whether a move is under way, by what is known now."""
+        """Whether a move is under way, by the last state."""
         return self._moving
 
     @property
@@ -456,12 +456,12 @@ class Positioner(Driver):
         return self.move_to(self.state.target + distance)
 
     def at(self, position: float) -> bool:
-        """Whether it was last read at a place."""
+        """Return whether its last position is a given one."""
         return abs(self.position - position) <= self.facts.near
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """`motor`, at the rate that the line allows."""
+        """The stream `motor`, at the rate that the line allows."""
         channels = (
             ChannelSpec(name="position", kind="position", unit="m"),
             ChannelSpec(name="current", kind="other", unit="A"),
@@ -474,7 +474,7 @@ class Positioner(Driver):
         self.update(0.0)
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the states that were read since the last call, and carry a move on; raises as :meth:`update`."""
+        """Return the states that were read since the last call, and continue moves; raises as :meth:`update`."""
         until_ns = self.clock() + round(1e9 * timeout_s)
         self.update(timeout_s)
         self._end_in_time()
@@ -489,7 +489,7 @@ class Positioner(Driver):
         return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]
 
     def stop(self) -> None:
-        """Hand out no more. The axis ends the move it has, and holds."""
+        """Drop unread states. The axis ends its move, and holds."""
         self._unread = []
 
 

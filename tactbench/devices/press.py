@@ -1,24 +1,24 @@
-"""One press as a state machine, stepped once a control period with the guard's report; it waits for nothing.
+"""One press as a state machine, stepped once a control period with the guard's report; it never waits.
 
 ::
 
     approach -> contact -> lift -> unloaded -> return -> ramp -> unload -> done
     any of them -> retreat -> failed
 
-The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
-touched, a small force kept for a while. From there the motor lifts the indenter off for the scene's unloaded hold, goes
-back, and follows the scene's profile. Touch is found on the raw force; the force is regulated on the filtered one. The
-guard looks at the raw force by itself, and retreats by itself.
+The surface is found first: a quick move to a place above it, a slow one until the raw force shows a touch, then a small
+force for a while. From there the motor lifts the indenter off for the scene's unloaded hold, returns, and follows the
+scene's profile. Touch is detected on the raw force; the force is regulated on the filtered one. The guard checks the
+raw force independently, and retreats independently.
 
-Place and force are believed only as far as they agree (derived; k is a stiffness, x a way into the skin):
+Place and force must agree (derived; k is a stiffness, x a way into the skin):
 
-- before the surface can be reached the mean force is zero; it is touched at the latest where the softest declared skin
-  has been; after lifting off the mean force is zero again;
-- on the ramp, x further in than at any place passed since the skin was touched, the mean force has grown by softest k x
-  to stiffest k x, but for twice the largest mean without touch, which is above the noise of a mean. So a force that has
-  ceased to answer is noticed after 2 mean/softest k.
+- before the surface can be reached the mean force is zero; the touch comes at the latest where the softest declared
+  skin is; after lifting off the mean force is zero again;
+- on the ramp, x further in than at any place since the touch, the mean force has grown by softest k x to stiffest k x,
+  but for twice the largest mean without touch, which is above the noise of a mean. So a force sensor that no longer
+  responds is detected after 2 mean/softest k.
 
-A wrong scale of the force is inside these limits: it is found by the check of the force chain alone.
+A wrong scale of the force is inside these limits: only the check of the force chain finds it.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from tactbench.devices.force_loop import ForceController, ForceLaw
 from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
 
 OFF_S = 1.0
-"""The force may be out of the band of errors for so long, less half of the time within it: a swing counts, too."""
+"""Longest time of the force outside the error band, less half of the time inside it, so that a swing counts."""
 OFF_SKIN_S = 2.0
-"""For so long after lifting off the mean force may take to be none: a skin comes back (assumed)."""
+"""Longest time from lifting off until the mean force is zero: a skin recovers (assumed)."""
 MOST_PERIODS = 3
-"""That a control period may count for in the force law where the program stood still."""
+"""Most periods that a step of the force law counts where the program stood still."""
 
 
 class PressState(StrEnum):
-    """Where a press is."""
+    """State of a press."""
 
     APPROACH = "approach"
     """Until the skin is touched."""
     CONTACT = "contact"
-    """A small force is kept."""
+    """Under a small force."""
     LIFT = "lift"
     UNLOADED = "unloaded"
     """Just above the skin, for the scene's unloaded hold."""
@@ -58,7 +58,7 @@ class PressState(StrEnum):
     """Just above the skin again."""
     RETREAT = "retreat"
     FAILED = "failed"
-    """The motor is out, and :attr:`Press.ended` says why."""
+    """The motor is out; :attr:`Press.ended` is the reason."""
 
 
 @dataclass(frozen=True)
@@ -66,50 +66,49 @@ class PressPlan:
     """The numbers of a press, in m, N and s."""
 
     law: ForceLaw
-    """In m."""
+    """The force law, in m."""
     resolution_m: float
-    """Of the axis: shorter steps are not sent, and kept for later ones."""
+    """Resolution of the axis: shorter steps are not sent, and added to later ones."""
     step_m: float
     """Largest increment of a control period."""
     near_m: float
-    """Where the axis goes over to the speed of touching: above where the surface can be."""
+    """Place above any surface, at which the axis changes to the speed of touching."""
     found_m: float
-    """Where the softest skin must have been touched: below where the surface can be."""
+    """Place below any surface, until which the softest skin must have been touched."""
     speed_m_s: float
-    """To `near_m`."""
+    """Speed to `near_m`."""
     touch_speed_m_s: float
-    """From there on."""
+    """Speed from there on."""
     unload_speed_m_s: float
     mean_n: float
-    """A touch: the mean of the newest `mean_count` raw forces above it; the guard stops at single ones. Also the
-    largest mean without touch."""
+    """Largest mean of the newest `mean_count` raw forces without touch; the guard halts at single forces."""
     mean_count: int
     softest_n_m: float
-    """The least force per way into any skin, from a touch on."""
+    """Least force per way into any skin, from the touch on."""
     stiffest_n_m: float
-    """The greatest."""
+    """Greatest force per way into any skin."""
     contact_n: float
-    """Force that is kept after the touch until the surface is known; and the least on the ramp."""
+    """Force after the touch until the surface is known; and the least force on the ramp."""
     settle_s: float
-    """How long."""
+    """Time under that force."""
     lift_m: float
-    """How far the axis goes back from there for the unloaded hold."""
+    """Way back from there for the unloaded hold."""
     error_band_n: float
-    """Filtered force this far from the wanted one for `OFF_S`: retreat."""
+    """Largest difference of the filtered force from the wanted one; the press ends after `OFF_S` beyond it."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """What a scene asks for."""
+    """Force profile of a scene."""
 
     setpoint_n: Callable[[float], float]
-    """Force at a second since its first sample."""
+    """Function from a second since the scene's first sample to the force."""
     slope_n_s: float
-    """Of the ramp."""
+    """Slope of the ramp."""
     ramp_s: float
-    """When the ramp begins."""
+    """Second at which the ramp begins."""
     end_s: float
-    """When it ends."""
+    """Second at which it ends."""
 
 
 class Press:
@@ -118,22 +117,22 @@ class Press:
     Parameters
     ----------
     plan
-        Of the rig.
+        Numbers of the rig.
     course
-        Of the scene.
+        Force profile of the scene.
 
     Attributes
     ----------
     state
-        Where it is.
+        State of the press.
     ended
-        Why it failed; empty: it has not.
+        Reason of the failure; empty: none.
     not_out
-        What is to be done where the motor did not come out; empty: it did.
+        Instruction to an operator where the motor did not come out; empty: it did.
     contact_m
-        Position of the motor at which the small force was kept; NaN: not yet.
+        Position of the motor under the small force; NaN: not reached yet.
     touch_n
-        Largest raw force from the first touch until the small force was kept.
+        Largest raw force from the first touch until that position was known.
     """
 
     def __init__(self, plan: PressPlan, course: Course) -> None:
@@ -157,7 +156,7 @@ class Press:
         self._requested_s: float | None = None
         self._move(plan.near_m, plan.speed_m_s)
 
-    # What a rig says --------------------------------------------------------------------------------------------------
+    # Calls of a rig ---------------------------------------------------------------------------------------------------
 
     @property
     def ready(self) -> bool:
@@ -166,21 +165,21 @@ class Press:
 
     @property
     def over(self) -> bool:
-        """Whether nothing more will happen."""
+        """Whether the press has ended."""
         return self.state in (PressState.DONE, PressState.FAILED)
 
     def begin(self, now_s: float) -> None:
-        """Let the scene begin: from now on its seconds count."""
+        """Let the scene begin: its seconds count from now on."""
         self._began_s = now_s
 
     def fail(self, why: str) -> None:
-        """Let the motor retreat, for a reason from outside; the first one stands."""
+        """Let the motor retreat for a reason; the first one is kept."""
         if not self.over and self.state is not PressState.RETREAT:
             self.ended = why
             self._enter(PressState.RETREAT, self._since_s)
 
     def abandon(self) -> None:
-        """Do nothing more: nobody steps it any longer."""
+        """End the press without a retreat: it is not stepped any longer."""
         if not self.over:
             self._enter(PressState.FAILED, self._since_s)
 
@@ -192,11 +191,11 @@ class Press:
         Parameters
         ----------
         report
-            What the guard answered last.
+            Last answer of the guard.
         raw
-            Raw pressing forces [N] that have come since the last step, the zero subtracted.
+            Raw pressing forces [N] since the last step, less the zero.
         now_s
-            On the rig's clock.
+            Second of the rig's clock.
         """
         self._take(raw, report.position_m)
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
@@ -214,10 +213,10 @@ class Press:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
                 return Beat(command=CommandKind.RETREAT)
-        return self._asking(report, now_s)
+        return self._pending(report, now_s)
 
     def _take(self, raw: Sequence[float], position_m: float) -> None:
-        """Keep the newest raw forces, where the axis was then, and the largest force of a touch."""
+        """Store the newest raw forces with the place of the axis, and the largest force of a touch."""
         self._raw.extend(raw)
         self._places.extend([position_m] * len(raw))
         if raw:
@@ -227,7 +226,7 @@ class Press:
 
     @property
     def mean_n(self) -> float:
-        """Mean of the newest `mean_count` raw forces [N]; NaN: not so many have come yet."""
+        """Mean of the newest `mean_count` raw forces [N]; NaN: fewer have come yet."""
         return fmean(self._raw) if len(self._raw) == self._raw.maxlen else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
@@ -250,8 +249,8 @@ class Press:
         self._goal = Beat(command=CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
         self._requested_s = None
 
-    def _asking(self, report: Report, now_s: float) -> Beat:
-        """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
+    def _pending(self, report: Report, now_s: float) -> Beat:
+        """Return the pending move, until the guard has accepted it; a stop at once."""
         if self._goal is None or self._requested_s is not None:
             return Beat()
         if report.moving and self._goal.command is not CommandKind.STOP:
@@ -260,7 +259,7 @@ class Press:
         return self._goal
 
     def _arrived(self, report: Report, now_s: float) -> bool:
-        """Return whether the last move is over; asks for it again if it was not accepted."""
+        """Return whether the last move is over; one that was not accepted is sent again."""
         if self._goal is None or self._requested_s is None or now_s <= self._requested_s:
             return False
         if not report.accepted:
@@ -285,17 +284,17 @@ class Press:
                 "something is in the way, the motor's place is wrong, or the zero was taken under load"
             )
         elif touched:
-            # The guard has stopped it at a single touch; a mean that is reached is stopped here.
+            # The guard has halted the axis at single forces; at a mean it is halted from here.
             self._goal = None if report.touched else Beat(command=CommandKind.STOP)
             self._requested_s = None
         elif self._arrived(report, now_s):
             if not slowly:
                 self._move(plan.found_m, plan.touch_speed_m_s)
             else:
-                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, where the file says the surface is")
+                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, where the surface is by the rig file")
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
-        """Go over to the next state where a move ends; on the way back to the skin also at a touch."""
+        """Enter the next state at the end of a move; on the way back to the skin also at a touch."""
         if not (self._arrived(report, now_s) or (self.state is PressState.RETURN and report.touched)):
             return
         if report.moving:
@@ -318,7 +317,7 @@ class Press:
 
     def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
         self._enter(state, now_s)
-        # A single sample has much noise, which the filter would take for a change of the force.
+        # The noise of a single sample would be a step at the input of the filter.
         force_n = self._force_n if math.isnan(self.mean_n) else self.mean_n
         self._controller, self._stepped_s = ForceController(self._plan.law, force_n, report.position_m), now_s
         self._raw.clear()
@@ -336,7 +335,7 @@ class Press:
     def _regulated(self, report: Report, now_s: float) -> Beat:
         controller, plan = self._controller, self._plan
         assert controller is not None
-        # After a longer standstill it is not known what the force was meanwhile.
+        # After a longer standstill the force in between is not known.
         passed_s, self._stepped_s = min(now_s - self._stepped_s, MOST_PERIODS * plan.law.period_s), now_s
         self.setpoint_n, slope = self._setpoint(now_s)
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
@@ -348,20 +347,20 @@ class Press:
                 self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
                 self._move(self.contact_m - plan.lift_m, plan.touch_speed_m_s)
-                return self._asking(report, now_s)
-        elif not self._kept(controller.filtered_n, passed_s):
+                return self._pending(report, now_s)
+        elif not self._within_limits(controller.filtered_n, passed_s):
             return Beat(command=CommandKind.RETREAT)
         elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
             self._enter(PressState.UNLOAD, now_s)
             self._move(self.contact_m - plan.lift_m, plan.unload_speed_m_s)
-            return self._asking(report, now_s)
+            return self._pending(report, now_s)
         way = controller.target - report.target_m
         if report.moving or abs(way) < 0.5 * plan.resolution_m:
             return Beat()
         return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
-    def _kept(self, filtered_n: float, passed_s: float) -> bool:
-        """Return whether force and place are as they should be; else see to what follows."""
+    def _within_limits(self, filtered_n: float, passed_s: float) -> bool:
+        """Return whether force and place are within their limits; fail else."""
         plan = self._plan
         self._agree(self.mean_n, fmean(self._places) if self._places else math.nan)
         off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
@@ -371,9 +370,9 @@ class Press:
         return not self.ended
 
     def _agree(self, force_n: float, place_m: float) -> None:
-        """Fail unless the force has grown with the way as declared skins allow, from every place passed on this way in.
+        """Fail unless the force has grown with the way as declared skins allow, from every place on this way in.
 
-        Of each of these places are kept: the place, and of it and those before the largest force above the softest
+        `_way` has for each of these places: the place, and over it and those before the largest force above the softest
         skin's, and the least above the stiffest's. Force and place are means of the same time.
         """
         plan, way = self._plan, self._way
@@ -383,9 +382,9 @@ class Press:
             way.pop()
         soft_n, stiff_n = force_n - plan.softest_n_m * place_m, force_n - plan.stiffest_n_m * place_m
         _, most_n, least_n = way[-1] if way else (place_m, soft_n, stiff_n)
-        lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not answer"
+        lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not respond"
         excessive = "more than on the stiffest declared skin: the zero drifts, or something else is touched"
-        for wrong_n, said in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
+        for wrong_n, text in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
             if wrong_n > 2 * plan.mean_n:
-                self.fail(f"{force_n:.2f} N at {1e3 * place_m:.3f} mm are {wrong_n:.2f} N {said}")
+                self.fail(f"{force_n:.2f} N at {1e3 * place_m:.3f} mm are {wrong_n:.2f} N {text}")
         way.append((place_m, max(most_n, soft_n), min(least_n, stiff_n)))

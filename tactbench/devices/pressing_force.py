@@ -1,4 +1,4 @@
-"""The force sensor of a rig as it is recorded: which channel is pressed, and what it reads without load."""
+"""The force sensor of a rig as it is recorded: its pressing channel, and its zero."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from tactbench.core.samples import Block, FloatArray
 
 LEAST_ROWS = 10
-"""From which a zero is taken."""
+"""Least number of rows of a zero."""
 STRETCHES = 30
-"""In which a zero is cut to see by how much their means scatter."""
+"""Number of stretches of a zero whose means show the scatter."""
 STRETCH_S = 0.02
-"""Noise of a force may be alike so long (assumed: a sample of 50 Hz that is held). No drift is told within 0.6 s."""
+"""Time over which noise may be correlated (assumed: a held sample of 50 Hz). A zero below 0.6 s has no drift test."""
 MOST_BAD = 0.1
-"""Of the rows that a zero is taken from, the share that may be no numbers (assumed)."""
+"""Largest share of rows of a zero that are no numbers or marked (assumed)."""
 _PRESSED = "normal"
-"""What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
+"""Name of the pressing channel where it is not plain `fz`; tasks look for either."""
 
 
 class PressingForce:
@@ -32,9 +32,9 @@ class PressingForce:
     Attributes
     ----------
     streams
-        Of the force sensor, the pressing channel with sign 1, and called `normal` where it is not plain `fz`.
+        Streams of the force sensor; the pressing channel has sign 1, and the name `normal` where it is not plain `fz`.
     stream, column, sign
-        Where the pressing force is, and 1 or -1: pressing makes the device's channel rise or fall.
+        Stream and column of the pressing force, and 1 or -1: pressing makes the device's channel rise or fall.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class PressingForce:
         self.streams = tuple(pressed if one is stream else one for one in streams)
 
     def zero(self, blocks: Iterable[Block]) -> dict[str, FloatArray]:
-        """Return what every channel reads without load, by stream: the mean of `blocks`, if nothing speaks against it.
+        """Return the zero of every channel, by stream: the mean of `blocks`, which were read without load.
 
         Every channel of unit N is tested: the size of its mean, its spread, its drift (the last third's mean less the
         first's). Rows that are no numbers or are marked are counted and left out.
@@ -101,7 +101,7 @@ class PressingForce:
         return found
 
     def _at_rest(self, name: str, values: FloatArray) -> Iterator[str]:
-        """Yield what is wrong with the readings of one channel without load."""
+        """Yield the problems of one channel's readings without load."""
         import numpy as np
 
         entry, third = self._entry, len(values) // 3
@@ -111,7 +111,7 @@ class PressingForce:
         ]
         if entry.zero_s >= STRETCHES * STRETCH_S and len(values) >= STRETCHES:
             drift = float(values[-third:].mean() - values[:third].mean())
-            # Means of stretches scatter by noise that is held or filtered, too; neighbours differ little by a drift.
+            # The scatter of the means includes held or filtered noise; a drift changes neighbours little.
             means = values[: len(values) // STRETCHES * STRETCHES].reshape(STRETCHES, -1).mean(axis=1)
             deviation = float(np.sqrt(np.mean(np.diff(means) ** 2) / 2 * 6 / STRETCHES))
             found.append(("drift", drift, max(0.01 * entry.range_n, 5 * deviation)))  # one zero in ten thousand
@@ -120,14 +120,14 @@ class PressingForce:
                 yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
 
     def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
-        """Return what a recording says of the mounting and of the `zero` taken off, by stream."""
+        """Return facts for a recording: the mounting, and the `zero` that is subtracted, by stream."""
         said = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
         if not self._plain:
             said["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
         return {**said, **self._zeroed}
 
     def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
-        """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
+        """Return a block less the `zero`, by stream, with the pressing force positive when pressing."""
         if block.stream not in zero:
             return block
         data = block.data - zero[block.stream]

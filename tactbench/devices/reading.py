@@ -20,75 +20,76 @@ from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
 QUEUE_S = 5.0
-"""Of data that a caller may be behind [s]."""
+"""Length of the data that a queue holds [s]."""
 UNRATED_HZ = 10_000.0
-"""Taken for the rate of a stream that states none (assumed: above that of any tactile sensor's)."""
+"""Rate of a stream that states none (assumed: above that of any tactile sensor)."""
 BLOCK_S = 0.05
-"""Between two blocks of a stream, about [s]; one of a caller who takes them too slowly holds all since."""
+"""Time between two blocks of a stream [s]; of a slower caller a block holds all rows since the last."""
 READ_S = 0.05
-"""Longest wait of one read: after this time at the latest a reader sees that it is to stop."""
+"""Longest wait of one read, after which a reader checks whether it is to stop."""
 STEP_S = 0.02
 """Virtual time between two reads of a device, so that the buffers of its link do not overflow (derived: the usual 256
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
-"""How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
+"""Timeout for the end of a reader (assumed: a read and a stop, each within its link's timeouts)."""
 
 
 class StreamQueue:
-    """One stream on its way from driver to caller: bounded, first in, first out.
+    """Bounded queue of one stream's blocks between driver and caller, first in, first out.
 
     :meth:`put` never waits for room: a block that does not fit is dropped whole, its rows are counted, and the next row
-    that gets in is marked with :attr:`~tactbench.core.samples.Quality.GAP`. So the newest are lost, and what is kept
-    has no holes but the marked ones. One thread puts, another takes.
+    that gets in is marked with :attr:`~tactbench.core.samples.Quality.GAP`. So the newest are lost, and every hole in
+    the rows is marked. One thread puts, another takes.
 
     Attributes
     ----------
     check
-        What the rows' numbers say.
-    came_ns
-        When the last block came.
+        Order and losses of the rows by their numbers.
+    received_ns
+        Time at which the last block was put.
     written, dropped
-        Rows that were taken, and that did not fit.
+        Number of rows that were taken, and that did not fit.
     """
 
     def __init__(self, device: str, spec: StreamSpec) -> None:
         self.device, self.rated = device, spec.rate_hz is not None
         self.check = SequenceCheck()
-        self.came_ns = self.written = self.dropped = 0
+        self.received_ns = self.written = self.dropped = 0
         self._rows, self._room = 0, math.ceil(QUEUE_S * (spec.rate_hz or UNRATED_HZ))
         self._blocks: list[Block] = []
-        self._layout: dict[str, tuple[int, ...]] = {}
+        self._layout: list[tuple[int, ...] | None] = []
         self._lossy = False
         self._lock = threading.Lock()
 
     def put(self, block: Block, now_ns: int) -> None:
-        """Add what is new of a block; raises RigError if it has other columns than the first one."""
+        """Add the new rows of a block; raises RigError if it has other columns than the first one."""
         kept = self.check(block)
         if kept is None:
             return
-        self.came_ns, rows = now_ns, len(kept.data)
-        kept = replace(kept, quality=np.zeros(kept.data.shape, np.uint8) if kept.quality is None else kept.quality)
-        found = {name: column for name in COLUMNS if (column := getattr(kept, name)) is not None}
-        layout = {name: column.shape[1:] for name, column in found.items()}
+        rows = len(kept.data)
+        quality = np.zeros(kept.data.shape, np.uint8) if kept.quality is None else kept.quality
+        columns = [getattr(kept, name) for name in COLUMNS if name != "quality"]
+        layout = [None if one is None else one.shape[1:] for one in columns]
         self._layout = self._layout or layout
-        if layout != self._layout or {len(column) for column in found.values()} != {rows}:
+        if layout != self._layout or any(one is not None and len(one) != rows for one in columns):
             raise RigError(
-                f"A block of stream {block.stream!r} with {rows} rows has {layout}, the first one had {self._layout}.",
+                f"A block of stream {block.stream!r} does not fit the first one.",
                 hint="Correct the driver: all blocks of a stream have the same columns, and one of each a row.",
             )
         with self._lock:
+            self.received_ns = now_ns
             if self._rows + rows > self._room:
-                self._lose(rows)
+                self._drop(rows)
                 return
-            if self._lossy and kept.quality is not None:
-                kept = replace(kept, quality=kept.quality.copy())
-                kept.quality[0] |= np.uint8(Quality.GAP)  # type: ignore[index]
+            if self._lossy:
+                quality = quality.copy()
+                quality[0] |= np.uint8(Quality.GAP)
                 self._lossy = False
-            self._blocks.append(kept)
+            self._blocks.append(replace(kept, quality=quality))
             self._rows += rows
 
     def take(self) -> Iterator[Block]:
-        """Remove what is in it and yield it as one block, if there is any."""
+        """Remove all blocks and yield them as one, if there are any."""
         with self._lock:
             found, self._blocks, self._rows = self._blocks, [], 0
         if found:
@@ -97,25 +98,23 @@ class StreamQueue:
             yield joined if np.any(joined.quality) else replace(joined, quality=None)
 
     def discard(self) -> None:
-        """Drop what is in it: nobody will take it."""
+        """Drop all rows, which are not taken any more."""
         with self._lock:
-            self._lose(self._rows)
+            self._drop(self._rows)
             self._blocks, self._rows = [], 0
 
-    def _lose(self, rows: int) -> None:
+    def _drop(self, rows: int) -> None:
         self.dropped += rows
         self._lossy |= rows > 0
 
 
 class Reading:
-    """Reads devices from the ``with`` that it stands in: starts them, yields their blocks, stops them. Used once.
+    """Context in which devices are read: it starts them, yields their blocks and stops them; for one use.
 
     In real time a thread reads each driver and puts its rows into a bounded queue a stream; a caller who takes them too
-    slowly loses the newest, which is counted and marked (:class:`StreamQueue`). In virtual time
-    there are no threads, and the caller cannot be too slow. The same data of the devices make the same rows in both;
-    where blocks begin differs. Rows are passed on as they come: none is trimmed to the duration.
-
-    Drivers are neither opened nor closed here.
+    slowly loses the newest, which is counted and marked (:class:`StreamQueue`). In virtual time there are no threads,
+    and the caller cannot be too slow. The same data of the devices make the same rows in both; where blocks begin
+    differs. No row is trimmed to the duration. Drivers are neither opened nor closed here.
 
     Parameters
     ----------
@@ -124,10 +123,9 @@ class Reading:
     clock
         The host's, the same as the drivers'.
     advance
-        For virtual time: carries `clock` forward to the given nanosecond, and emulated devices with it. None: real
-        time.
+        For virtual time: advances `clock` to a nanosecond, and emulated devices with it. None: real time.
     silent_s
-        A stream with a rate of which nothing came for longer ends the reading.
+        Longest time without a block of a stream that states a rate; a longer one ends the reading.
     """
 
     def __init__(
@@ -149,7 +147,7 @@ class Reading:
         self._over = threading.Event()
         self._lock = threading.Lock()
         self.ended = ""
-        """Which device ended the reading, and why, without a full stop; empty: none did."""
+        """Name of the device that ended the reading, and the reason; empty: none did."""
 
     def __enter__(self) -> Self:
         try:
@@ -158,16 +156,15 @@ class Reading:
                 driver.start()
                 for spec in driver.streams:
                     if spec.name in self._streams:
+                        hint = "Streams of one recording have different names."
                         raise UsageError(
-                            f"The stream {spec.name!r} of {name} is there already, of another device.",
-                            hint="Streams of one recording have different names.",
+                            f"The stream {spec.name!r} of {name} is also one of another device.", hint=hint
                         )
                     self._streams[spec.name] = StreamQueue(name, spec)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
-                    threading.Thread(
-                        target=self._read, args=(name, driver), name=f"reading {name}", daemon=True
-                    ).start()
+                    title = f"reading {name}"
+                    threading.Thread(target=self._read, args=(name, driver), name=title, daemon=True).start()
         except BaseException:
             self.__exit__()
             raise
@@ -180,10 +177,10 @@ class Reading:
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """By stream: what became of its rows.
+        """Counts of the rows of each stream.
 
-        After the ``with`` block received = written + dropped + duplicates + late. `written` are those that were
-        yielded. `gaps` are rows missing where they were due, late ones among them; a stream without numbers has none.
+        After the ``with`` block received = written + dropped + duplicates + late. `written` rows were yielded. `gaps`
+        are rows that were missing where they were due, including late ones; 0 for a stream without numbers.
         """
         return {
             name: StreamCounts(
@@ -199,7 +196,7 @@ class Reading:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What the drivers counted, as ``device: name``, once the reading is over."""
+        """Counts of the drivers by ``device: name``, once the reading is over."""
         return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
 
     def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
@@ -208,9 +205,9 @@ class Reading:
         Parameters
         ----------
         duration_s
-            Seconds of the clock from the first block asked for; may be infinite.
+            Seconds of the clock from the call for the first block; may be infinite.
         is_over
-            Asked at every block's time, whether or not a device has sent anything: true ends the reading too.
+            Called at every block's time, whether or not a device has sent anything; true ends the reading too.
         """
         now_ns = began_ns = self._clock()
         end_ns = now_ns + 1e9 * duration_s
@@ -220,29 +217,27 @@ class Reading:
                 self._over.wait((until_ns - now_ns) / 1e9)
                 now_ns = self._clock()
             else:
-                now_ns = self._carry(self._advance, now_ns, until_ns)
+                now_ns = self._advance_and_read(self._advance, now_ns, until_ns)
             for name, stream in self._streams.items():
                 yield from stream.take()
-                silent_ns = now_ns - max(began_ns, stream.came_ns)
+                silent_ns = now_ns - max(began_ns, stream.received_ns)
                 if stream.rated and silent_ns > self._silent_ns:
                     self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
         self._finish()
         for stream in self._streams.values():
             yield from stream.take()
 
-    def _take_over(self, name: str, driver: Driver, timeout_s: float) -> bool:
+    def _read_once(self, name: str, driver: Driver, timeout_s: float) -> bool:
         blocks = driver.read(timeout_s)
         for block in blocks:
             if block.stream not in self._streams:
-                raise RigError(
-                    f"A block of stream {block.stream!r} came, which {name} did not announce.",
-                    hint="Correct the driver: its streams are fixed once it is started.",
-                )
+                hint = "Correct the driver: its streams are fixed once it is started."
+                raise RigError(f"A block of stream {block.stream!r} came, which {name} did not announce.", hint=hint)
             self._streams[block.stream].put(block, self._clock())
         return bool(blocks)
 
-    def _carry(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
-        """Carry virtual time forward, and read what the devices send meanwhile; return the time then."""
+    def _advance_and_read(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
+        """Advance virtual time, and read the devices meanwhile; return the time at the end."""
         while not self._over.is_set() and now_ns < until_ns:
             now_ns = min(now_ns + round(1e9 * STEP_S), until_ns)
             advance(now_ns)
@@ -255,8 +250,8 @@ class Reading:
         return now_ns
 
     def _exhaust(self, name: str, driver: Driver, until_ns: int) -> None:
-        """Read until nothing comes, or until the clock is past: a driver that asks its device takes time itself."""
-        while self._take_over(name, driver, 0.0) and self._clock() <= until_ns:
+        """Read until nothing comes, or until a time is over: a driver that polls its device takes time itself."""
+        while self._read_once(name, driver, 0.0) and self._clock() <= until_ns:
             pass
 
     def _read(self, name: str, driver: Driver) -> None:
@@ -268,7 +263,7 @@ class Reading:
             self._readers[name] = threading.current_thread()
         try:
             while not self._over.is_set():
-                self._take_over(name, driver, READ_S)
+                self._read_once(name, driver, READ_S)
             self._exhaust(name, driver, self._clock() + round(1e9 * READ_S))
         except Exception as error:
             self._fail(name, error)
@@ -288,12 +283,12 @@ class Reading:
         self._over.set()
 
     def _finish(self) -> None:
-        """Let every device stop that was started, or was being started.
+        """Stop every device that was started, or was being started.
 
-        A reader that does not come back is left alone, and its device too, since one thread uses a driver; it ends when
-        the link is closed.
+        A reader that does not end within `STOP_S` keeps its driver, since one thread uses a driver; it ends when the
+        link is closed.
         """
-        with self._lock:  # a thread that Ctrl-C has overtaken while it was started leaves the driver alone from now on
+        with self._lock:  # a thread that was being started when Ctrl-C came does not touch the driver from now on
             self._over.set()
         while self._to_stop:
             self._stop(self._to_stop[-1], self._drivers[self._to_stop[-1]])

@@ -1,4 +1,4 @@
-"""The devices of a rig file: their emulators and their drivers, from what is installed."""
+"""The devices of a rig file: their emulators and their drivers, from the installed plugins."""
 
 from __future__ import annotations
 
@@ -35,23 +35,21 @@ def with_sensor(file: RigFile, sensor: str) -> RigFile:
 
 
 def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> bool:
-    """Let somebody do at the rig what `text` says, in a word `doing`; return whether it was done.
+    """Prompt the operator with `text`, in a word `doing`; return whether the operator has confirmed.
 
-    Devices that are all emulated need nobody.
+    Devices that are all emulated need no operator.
 
     Raises
     ------
     RigError
-        If nobody is there.
+        If there is no operator.
     """
-    told = bool(file.emulation.control)
-    if all(entry.emulated or (entry.emulator and told) for entry in file.entries().values()):
+    announced = bool(file.emulation.control)
+    if all(entry.emulated or (entry.emulator and announced) for entry in file.entries().values()):
         return False
     if operator is None:
-        raise RigError(
-            f"Somebody has to {doing}: {text}",
-            hint="Start it at a terminal, or use a rig file with emulated devices.",
-        )
+        hint = "Start it at a terminal, or use a rig file with emulated devices."
+        raise RigError(f"Somebody has to {doing}: {text}", hint=hint)
     operator.prompt(text)
     return True
 
@@ -59,8 +57,8 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:
     """Return the emulated devices of a rig with one of its sensors, by the names of :meth:`RigFile.entries`.
 
-    `senses` is what the channels read. Of the force sensor, its entry's channel gets the pressing force (``fz``) with
-    the entry's sign, and all its other channels are at rest. Each device draws from a generator of its own, made of the
+    The channels read `senses`. Of the force sensor, its entry's channel gets the pressing force (``fz``) with the
+    entry's sign, and all its other channels are at rest. Each device draws from a generator of its own, made of the
     file's seed and its name: a further device changes nothing for the others.
 
     Raises
@@ -71,9 +69,10 @@ def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses)
         If the file has no entry for the sensor, a device has no emulator, or an option or fault is not known.
     """
     devices = {}
-    for name, (entry, descriptor) in _used(file, registry, sensor).items():
-        if entry.emulated:
-            with _entry(name):
+    for name, entry in with_sensor(file, sensor).entries().items():
+        with _entry(name):
+            descriptor = descriptor_of(registry, name, entry)
+            if entry.emulated:
                 devices[name] = emulated_device(descriptor, name, entry, senses, file.emulation.seed)
     return devices
 
@@ -115,11 +114,11 @@ def drivers_of(
     Parameters
     ----------
     links
-        By name: what opens the links of emulated devices. The others are opened by the file's addresses.
+        Functions that open the links of emulated devices, by name. The others are opened by the file's addresses.
     clock
-        The host's.
+        Clock of the host.
     names
-        Which ones; None: the sensor, and the force sensor if the file has one.
+        Names of the devices; None: the sensor, and the force sensor if the file has one.
 
     Raises
     ------
@@ -128,16 +127,15 @@ def drivers_of(
     UsageError
         If the file has no entry for the sensor, a device has no driver, or an option is not known.
     LinkError, RigError
-        If a link cannot be opened, or a device refuses. What was opened before is closed again.
+        If a link cannot be opened, or a device refuses. Devices that were opened before are closed again.
     """
     drivers: dict[str, Driver] = {}
     with ExitStack() as opened:
-        for name, (entry, descriptor) in _used(file, registry, sensor).items():
-            if name not in ((sensor, FORCE) if names is None else names):
-                continue
+        for name, entry in with_sensor(file, sensor).entries().items():
             with _entry(name):
-                drivers[name] = open_driver(descriptor, entry, clock, links.get(name))
-            opened.callback(drivers[name].close)
+                descriptor = descriptor_of(registry, name, entry)
+                if name in ((sensor, FORCE) if names is None else names):
+                    drivers[name] = opened.enter_context(open_driver(descriptor, entry, clock, links.get(name)))
         opened.pop_all()
     return drivers
 
@@ -148,7 +146,7 @@ def open_driver(
     clock: Clock,
     link: Callable[[], Link] | None = None,
 ) -> Driver:
-    """Open one device; see :func:`drivers_of`. `link` opens that of an emulated one."""
+    """Open one device; see :func:`drivers_of`. `link` opens the link of an emulated one."""
     if descriptor.driver is None:
         raise UsageError(
             f"{descriptor.name} has no driver: it can be simulated or replayed, not read.",
@@ -167,31 +165,20 @@ def open_driver(
     return driver
 
 
-def _used(
-    file: RigFile, registry: Registry, sensor: str
-) -> dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]]:
-    """Return the entries of a rig with one sensor, each with what is installed for it."""
-    used: dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]] = {}
-    for name, entry in with_sensor(file, sensor).entries().items():
-        with _entry(name):
-            used[name] = entry, descriptor_of(registry, name, entry)
-    return used
-
-
 def options_of(descriptor: SensorDescriptor | DeviceDescriptor, entry: DeviceEntry) -> dict[str, Scalar | bool]:
-    """Return the options of an entry, with those of the emulated device that it leaves out, if it is one."""
+    """Return the options of an entry; an emulated device has defaults for those that are left out."""
     return {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
 
 
 def descriptor_of(registry: Registry, name: str, entry: DeviceEntry) -> SensorDescriptor | DeviceDescriptor:
-    """Return what is installed for an entry of a rig file.
+    """Return the descriptor of the sensor or device of an entry in a rig file.
 
     Raises
     ------
     UnknownNameError
-        If nothing of that name is.
+        If it is not installed.
     UsageError
-        If the force sensor is none.
+        If the force sensor's device is of another kind.
     """
     if not isinstance(entry, ForceEntry | NamedDevice):
         return registry.sensors[name]
@@ -204,7 +191,7 @@ def descriptor_of(registry: Registry, name: str, entry: DeviceEntry) -> SensorDe
 
 @contextmanager
 def _entry(name: str) -> Iterator[Any]:
-    """Say in errors which entry of the rig file they are about."""
+    """Name the entry of the rig file in errors."""
     try:
         yield
     except TactbenchError as error:

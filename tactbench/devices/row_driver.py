@@ -1,4 +1,4 @@
-"""A driver of one stream, for devices that need no more than a way to turn what comes into rows."""
+"""Driver of one stream, for devices whose received data become rows without more ado."""
 
 from __future__ import annotations
 
@@ -29,25 +29,24 @@ class Sample(NamedTuple):
     quality: Sequence[int] | None = None
     """A :class:`~tactbench.core.samples.Quality` each; None: all good."""
     t_ns: int | None = None
-    """When it came, where its last piece came before what completes it; None: with what was received."""
+    """Time of receipt, where its last piece came before the data that complete it; None: that of the data."""
 
 
 class RowDriver(Driver, Generic[L]):
-    """One stream behind one link; a subclass says what the link is and how what comes becomes :meth:`rows`.
+    """Driver of one stream behind one link; a subclass has the kind of link and makes :meth:`rows` of received data.
 
-    Rows have the time at which the host had them. A device with several streams, numbers or a clock of its own needs a
+    Rows have their time of receipt. A device with several streams, numbers or a clock of its own needs a
     :class:`Driver`.
-
     """
 
     stream: ClassVar[StreamSpec]
-    """What it reads."""
+    """Stream that it reads."""
     link: L
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
         self.counted: Counter[str] = Counter()
-        """What :attr:`counts` tells: subclasses count here what they leave out."""
+        """Counts of a subclass, such as damaged frames, by name."""
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -56,32 +55,32 @@ class RowDriver(Driver, Generic[L]):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What was counted, by name, by the driver and by its link."""
+        """Counts of the driver and of its link, by name."""
         return {**getattr(self.link, "counts", {}), **self.counted}
 
     def start(self) -> None:
-        """Drop what came before, and :meth:`begin`."""
+        """Discard received data, and call :meth:`begin`."""
         self.link.discard()
         self.begin()
 
     def begin(self) -> None:
-        """Nothing, unless a subclass has a part of a frame to forget, or something to send."""
+        """Drop the part of a frame and let the device sample, in a subclass that needs it."""
 
     def ask(self) -> None:
-        """Nothing, unless a device is to be asked before its answer is read."""
+        """Send a request, in a subclass whose device answers requests; called before each read."""
 
     @abstractmethod
     def rows(self, received: Any) -> Iterable[Sample]:
-        """Return the rows that are complete with what was received.
+        """Return the rows that received data complete.
 
         Parameters
         ----------
         received
-            Of a ByteLink or DatagramLink a ``Received`` (data, t_ns), of a CanLink a ``CanFrame``.
+            A ``Received`` (data, t_ns) of a ByteLink or DatagramLink, a ``CanFrame`` of a CanLink.
         """
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return what has come."""
+        """Return the rows received since the last call."""
         self.ask()
         times: list[int] = []
         found: list[Sample] = []
@@ -89,9 +88,9 @@ class RowDriver(Driver, Generic[L]):
         until_s = link.timer() + timeout_s
         while not found:
             for received in link.receive_all(max(0.0, until_s - link.timer())):
-                fresh = list(self.rows(received))
-                times += [received.t_ns if row.t_ns is None else row.t_ns for row in fresh]
-                found += fresh
+                for row in self.rows(received):
+                    times.append(received.t_ns if row.t_ns is None else row.t_ns)
+                    found.append(row)
             if not found and link.timer() >= until_s:
                 return []
         data = np.array([row.values for row in found]).astype(self.stream.dtype)
@@ -100,9 +99,9 @@ class RowDriver(Driver, Generic[L]):
         return [Block(self.stream.name, np.array(times, np.int64), data, quality if quality.any() else None)]
 
     def stop(self) -> None:
-        """Nothing, unless :meth:`quiet` sends something; raises nothing if the device is gone."""
+        """Call :meth:`quiet`; raises nothing if the device is gone."""
         with suppress(LinkError):
             self.quiet()
 
     def quiet(self) -> None:
-        """Nothing, unless the device can be told to stop."""
+        """Stop the device, in a subclass that can."""

@@ -1,18 +1,14 @@
-"""The emulated devices of a rig file, and the simulated scenes that move them, in this process or in one of their own.
+"""The emulated devices of a rig file, and the simulated scenes that they sense: in this process, or in another one.
 
-In real time a recording's own work would hold up the devices that it reads: they run in another process, in which a
-simulated rig carries out the scene that the recording is of. The devices are at rest until the recording begins.
+In virtual time the devices are in the process of the rig. In real time `tactbench emulate` serves them in a process of
+its own, which the rig's work cannot delay; there a simulated rig carries out each scene that the rig announces. The
+devices are at rest until the recording begins.
 """
 
 from __future__ import annotations
 
-import atexit
 import json
-import signal
 import socket
-import subprocess
-import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import SimpleNamespace
@@ -20,25 +16,26 @@ from typing import Any, Protocol
 
 from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UsageError
 from tactbench.core.plugins.interfaces import Acquisition, Rig
-from tactbench.core.plugins.registry import Registry, load_object, load_registry
+from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
-from tactbench.core.spec.rig_file import FORCE, RigFile
+from tactbench.core.spec.rig_file import FORCE, DeviceEntry, RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.scene_samples import SceneSamples
 from tactbench.devices.rig_devices import descriptor_of, emulators_of, options_of
 
 PREPARE_S = 300.0
-"""Longest wait for a scene to be simulated."""
+"""Timeout for the simulation of a scene in another process."""
 BEGIN_S = 5.0
+"""Timeout for the begin of a scene there."""
 LISTEN_S = 0.2
-"""How often a server looks whether its devices are whole, and whether it is to end."""
+"""Longest wait for a message, after which errors of the devices are looked for."""
 
 
 class RigEmulators(Protocol):
-    """What ``RigDescriptor.emulators`` makes of a rig file and a registry: emulators that outlive scenes."""
+    """Emulators of a rig, which outlive scenes; ``RigDescriptor.emulators`` makes them of a rig file and a registry."""
 
     devices: Mapping[str, EmulatedDevice]
     """By their names in the rig file; at rest before the first scene."""
@@ -64,33 +61,28 @@ class SceneEmulators(RigEmulators):
         return {} if self._samples is None else self._samples(t_s)
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
-        """Take a scene."""
+        """Take the samples of a scene."""
         profile = scene.profile
         streams = (*simulated.streams, *simulated.reference)
         self._samples = SceneSamples(streams, simulated, profile.duration.to("s"), rest_s=profile.hold_s)
 
     def begin(self, at_s: float) -> None:
-        """Press."""
+        """Let the scene begin."""
         if self._samples is not None:
             self._samples.start(at_s)
 
 
 def serve(
-    file: RigFile,
-    registry: Registry,
-    *,
-    started: Callable[[RigFile], None],
-    over: Callable[[], bool] = lambda: False,
-    told: Callable[[str], None] = lambda text: None,
+    file: RigFile, registry: Registry, *, started: Callable[[RigFile], None], progress: Callable[[str], None]
 ) -> None:
-    """Run the emulated devices of a rig file in real time, until `over` or an interrupt.
+    """Run the emulated devices of a rig file in real time, until an interrupt.
 
     Parameters
     ----------
     started
-        Called with the rig file that opens them.
-    told
-        Called with a sentence for each scene that begins.
+        Called once with the rig file that opens the devices.
+    progress
+        Called with a sentence for each scene that is prepared or begins.
 
     Raises
     ------
@@ -107,28 +99,27 @@ def serve(
         control.bind(("127.0.0.1", 0))
         control.settimeout(LISTEN_S)
         started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
-        while not over():
-            emulated.advance(emulated.clock())  # raises what an emulator has raised
+        while True:
+            emulated.advance(emulated.clock())  # raises the error of an emulator
             try:
                 data, peer = control.recvfrom(65536)
             except TimeoutError:
                 continue
-            asked = json.loads(data)
-            answer: dict[str, Any] = {}
+            request, answer = json.loads(data), dict[str, Any]()
             try:
-                if asked.get("begin"):
+                if request.get("begin"):
                     emulators.begin(emulated.clock() * 1e-9)
-                    told("The scene begins")
+                    progress("The scene begins")
                 elif physics is not None:
-                    sensor, scene = registry.sensors[asked["sensor"]], Scene.model_validate(asked["scene"])
-                    with physics.open(sensor, scene, seed=asked["seed"]) as simulated:
-                        emulators.prepare(simulated, sensor, scene, asked["seed"])
+                    sensor, scene = registry.sensors[request["sensor"]], Scene.model_validate(request["scene"])
+                    with physics.open(sensor, scene, seed=request["seed"]) as simulated:
+                        emulators.prepare(simulated, sensor, scene, request["seed"])
                         answer = {
                             "plan": [entry.model_dump(mode="json") for entry in simulated.plan],
                             "assumptions": dict(simulated.assumptions),
                             "drawn": dict(simulated.drawn),
                         }
-                    told(f"Ready for {scene.name}: {sensor.name}, {scene.indenter}")
+                    progress(f"Ready for {scene.name}: {sensor.name}, {scene.indenter}")
             except TactbenchError as error:
                 answer = {"error": error.message, "hint": error.hint, "skip": isinstance(error, NotApplicable)}
             control.sendto(json.dumps(answer).encode(), peer)
@@ -137,31 +128,34 @@ def serve(
 def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], control: str) -> RigFile:
     """Return the rig file that opens emulated devices at their addresses."""
 
-    def at(name: str, entry: Any) -> Any:
-        if name not in addresses:
-            return entry
-        options = options_of(descriptor_of(registry, name, entry), entry)
-        return entry.model_copy(update={"link": addresses[name], "options": options, "faults": (), "emulator": True})
+    def opening(entries: Mapping[str, DeviceEntry]) -> dict[str, Any]:
+        found = dict(entries)
+        for name in addresses.keys() & entries.keys():
+            options = options_of(descriptor_of(registry, name, entries[name]), entries[name])
+            update = {"link": addresses[name], "options": options, "faults": (), "emulator": True}
+            found[name] = entries[name].model_copy(update=update)
+        return found
 
-    update: dict[str, Any] = {
-        "sensors": {name: at(name, entry) for name, entry in file.sensors.items()},
-        "devices": {name: at(name, entry) for name, entry in file.devices.items()},
-        "emulation": file.emulation.model_copy(update={"time": "real", "control": control}),
-    }
-    if file.force is not None:
-        update["force"] = at(FORCE, file.force)
-    return file.model_copy(update=update)
+    force = {} if file.force is None else opening({FORCE: file.force})
+    return file.model_copy(
+        update={
+            "sensors": opening(file.sensors),
+            "devices": opening(file.devices),
+            "force": force.get(FORCE),
+            "emulation": file.emulation.model_copy(update={"control": control}),
+        }
+    )
 
 
 class ScenePhysics(Rig):
-    """What carries out the scenes that move a rig's emulated devices.
+    """The simulation of the scenes that a rig's emulated devices sense.
 
     Parameters
     ----------
     rig
-        The simulated rig; None: it is in the process that the devices are in.
+        The simulated rig; None: it is in the process of the devices.
     control
-        Where that process listens, ``host:port``, as ``emulation: control`` of a rig file says.
+        Address ``host:port`` of that process, from ``emulation: control`` of a rig file.
     """
 
     def __init__(self, rig: Rig | None, control: str = "") -> None:
@@ -174,23 +168,24 @@ class ScenePhysics(Rig):
         Raises
         ------
         NotApplicable, RigError
-            If it cannot be, or nobody answers.
+            If the scene cannot be carried out, or the other process does not answer.
         """
         if self._rig is not None:
             with self._rig.open(sensor, scene, seed=seed) as simulated:
                 yield simulated
             return
-        said = self._ask({"sensor": sensor.name, "scene": scene.model_dump(mode="json"), "seed": seed}, PREPARE_S)
-        said["plan"] = tuple(map(PlanEntry.model_validate, said["plan"]))
-        there: Any = SimpleNamespace(**said)  # an Acquisition without streams
-        yield there
+        request = {"sensor": sensor.name, "scene": scene.model_dump(mode="json"), "seed": seed}
+        answer = self._request(request, PREPARE_S)
+        plan = tuple(map(PlanEntry.model_validate, answer.pop("plan")))
+        without_streams: Any = SimpleNamespace(plan=plan, **answer)
+        yield without_streams
 
     def begin(self) -> None:
         """Let the scene begin in the other process; raises as :meth:`open`."""
         if self._rig is None:
-            self._ask({"begin": True}, BEGIN_S)
+            self._request({"begin": True}, BEGIN_S)
 
-    def _ask(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
+    def _request(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
         host, _, port = self._control.rpartition(":")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             link.settimeout(timeout_s)
@@ -209,7 +204,7 @@ class ScenePhysics(Rig):
 
 
 def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
-    """Return what carries out the scenes that move a rig's emulated devices; None: it has none.
+    """Return the simulation of the scenes that a rig's emulated devices sense; None: the file has no such devices.
 
     Raises
     ------
@@ -224,79 +219,3 @@ def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
             f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
         )
     return ScenePhysics(load_object(descriptor.where)(rig_context(registry)))
-
-
-class _Child:
-    """The process of one rig file's emulators; it ends when its stdin is closed, or this process is gone."""
-
-    def __init__(self, file: RigFile) -> None:
-        code = "from tactbench.devices.scene_emulators import main; main()"
-        self.process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(file.model_dump_json().encode() + b"\n")
-        self.process.stdin.flush()
-        said = json.loads(self.process.stdout.readline() or '{"error": "its process ended", "hint": ""}')
-        if "error" in said:
-            self.close()
-            raise RigError(f"The devices cannot be emulated: {said['error']}", hint=said["hint"])
-        self.file = RigFile.model_validate(said)
-
-    def close(self) -> None:
-        try:
-            self.process.communicate(timeout=10.0)  # it closes its stdin
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.communicate()
-
-
-_children: dict[str, _Child] = {}
-"""By rig file; at most one."""
-
-
-def running(file: RigFile) -> RigFile:
-    """Return a rig file whose devices can be opened: emulated ones in real time run in a process of their own.
-
-    They go on until another file's are asked for, or this process ends. A file without such devices comes back as it
-    is.
-
-    Raises
-    ------
-    RigError
-        If they cannot be emulated.
-    """
-    if not file.emulated or file.emulation.time == "virtual":
-        return file
-    key = file.model_dump_json()
-    child = _children.get(key)
-    if child is None or child.process.poll() is not None:
-        end_running()
-        child = _children[key] = _Child(file)
-    return child.file
-
-
-def end_running() -> None:
-    """End the emulators that run in a process of their own."""
-    while _children:
-        _children.popitem()[1].close()
-
-
-atexit.register(end_running)
-
-
-def main() -> None:
-    """Serve the rig file of the first line of stdin; end when stdin does."""
-    for number in {signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)}:
-        signal.signal(number, signal.SIG_IGN)  # of the whole terminal: who reads the devices has to end first
-    over = threading.Event()
-    file = RigFile.model_validate_json(sys.stdin.readline())
-
-    def listen() -> None:
-        sys.stdin.read()
-        over.set()
-
-    threading.Thread(target=listen, daemon=True).start()
-    try:
-        serve(file, load_registry(), started=lambda live: print(live.model_dump_json(), flush=True), over=over.is_set)
-    except TactbenchError as error:
-        print(json.dumps({"error": error.message, "hint": error.hint}), flush=True)

@@ -1,4 +1,4 @@
-"""Counters of devices: counted on over their wraps, and what they say of rows lost, doubled or late."""
+"""Counters of devices: unwrapped, and checked for rows that are lost, doubled or late."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy.typing as npt
 from tactbench.core.samples import Block, IntArray, Quality
 
 RESTARTED = 20
-"""Rows behind the highest number, each one above the one before, after which a counter has begun anew (assumed: a
-network holds back fewer datagrams in order)."""
+"""Number of rows behind the highest number, each one above the one before, after which a counter has restarted
+(assumed: a network holds back fewer datagrams in order)."""
 
 
 class Unwrap:
-    """A counter of `bits` bits, counted on over its wraps.
+    """Unwrapped counter of `bits` bits.
 
-    The difference d from the highest count so far, modulo 2^bits, says what a count is: 0 a duplicate, 1 the next one,
+    The difference d from the highest count so far, modulo 2^bits, classifies a count: 0 is a duplicate, 1 the next one,
     up to 2^(bits-1) - 1 one after a gap of d - 1, above that a late one (derived: half of the range each way; for 32
-    bits the same as pyNetFT's sequence.cpp). A late one gets the number it has, and the highest stays. Nothing of this
-    holds once the counter may have advanced by more than half a wrap unseen: 32 bits at 7 kHz take 85 hours for that.
+    bits the same as pyNetFT's sequence.cpp). A late one gets its own number, and the highest stays. The counter must
+    not advance by more than half a wrap between two counts: 32 bits at 7 kHz take 85 hours for that.
     """
 
     def __init__(self, bits: int) -> None:
@@ -28,7 +28,7 @@ class Unwrap:
         self._highest: int | None = None
 
     def __call__(self, counts: npt.ArrayLike) -> IntArray:
-        """Return (n,) int64 numbers of (n,) `counts`, in the order in which they came; the first is its own number."""
+        """Return (n,) int64 numbers of (n,) `counts` in the order of receipt; the first is its own number."""
         now = np.asarray(counts).astype(np.int64) % self._modulus
         for place, count in enumerate(now.tolist()):
             highest = count if self._highest is None else self._highest
@@ -40,22 +40,22 @@ class Unwrap:
 
 
 class SequenceCheck:
-    """What the numbers of one stream's rows say: duplicates and late rows are kept out, the row after a gap is marked.
+    """Filter of one stream's rows by their numbers: it drops duplicates and late rows, and marks the row after a gap.
 
-    A device that was started anew counts from its beginning: after `RESTARTED` rows that seemed late, which are lost,
-    numbers go on from the highest one, with a gap of one row or more.
+    The counter of a device that was restarted begins again: after `RESTARTED` rows that seemed late, which are lost,
+    numbers continue from the highest one, with a gap of one row or more.
 
-    A stream without numbers passes as it is. Its gaps are not guessed from its times: an interval of more than 1.5
-    periods is as often a late host as a lost row, and only the fitted clocks can tell.
+    A stream without numbers passes unchanged. Its gaps are not guessed from its times: an interval of more than 1.5
+    periods is as often a late host as a lost row.
 
     Attributes
     ----------
     received
-        Rows that came, whatever became of them.
+        Number of rows received.
     duplicates, late
-        Rows kept out that had the highest number so far, or a lower one.
+        Number of dropped rows with the highest number so far, or a lower one.
     gaps
-        Rows that were missing where they were due; late ones are among them.
+        Number of rows that were missing where they were due, including late ones.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class SequenceCheck:
         self._shift, self._behind = 0, (0, 0)
 
     def __call__(self, block: Block) -> Block | None:
-        """Return `block` with the rows that are passed on, all channels of those after a gap marked; None without."""
+        """Return the block without dropped rows, rows after a gap marked in all channels; None: no row is left."""
         self.received += len(block.data)
         if block.sequence is None or not len(block.sequence):
             return block if len(block.data) else None
@@ -86,7 +86,7 @@ class SequenceCheck:
         return kept if len(kept.data) else None
 
     def _counted_on(self, numbers: IntArray) -> IntArray:
-        """Return numbers that go on where the device's counter has begun anew."""
+        """Return numbers that continue where the device's counter has restarted."""
         numbers = numbers + self._shift
         highest = int(numbers[0]) - 1 if self._highest is None else self._highest
         if numbers[0] > highest and (np.diff(numbers) > 0).all():
@@ -99,7 +99,7 @@ class SequenceCheck:
                 self._behind = (number, rows + 1 if number == last + 1 else 1)
                 if self._behind[1] == RESTARTED:
                     added = highest + 2 - number
-                    # Those before were counted as late, which stands for rows that were gaps before: they are lost.
+                    # The rows before were counted as late, which are among gaps: they are lost.
                     self.gaps += 2 * (RESTARTED - 1)
             elif number + added > highest:
                 self._behind = (0, 0)

@@ -60,7 +60,6 @@ if TYPE_CHECKING:
         SceneEmulators,
         ScenePhysics,
         physics_of,
-        running,
     )
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link, read_options
@@ -152,7 +151,6 @@ __all__ = [
     "physics_of",
     "read_can_log",
     "read_options",
-    "running",
     "samples",
     "with_sensor",
 ]

@@ -45,4 +45,4 @@ def is_computed(request: RecordingRequest) -> bool:
     simulated, devices = request.rig.simulated, request.rig_file
     if simulated or devices is None:
         return simulated
-    return devices.emulation.time == "virtual" and all(entry.emulated for entry in devices.entries().values())
+    return all(entry.emulated for entry in devices.entries().values())

@@ -84,9 +84,6 @@ class NamedDevice(DeviceEntry):
 class EmulationSettings(Frozen):
     """Settings of the emulation of a rig's devices."""
 
-    time: Literal["virtual", "real"] = "virtual"
-    """Clock of the emulated devices: `virtual` is as fast as they are computed, and the same each time; `real` is the
-    wall clock."""
     physics: str = ""
     """Name of the simulated rig whose samples the devices read; empty: the one that comes with tactbench."""
     seed: int = Field(default=1, ge=0)
@@ -129,12 +126,12 @@ class RigFile(Frozen):
         return self
 
     def checked_for_one_clock(self) -> RigFile:
-        """Return this file; raise UsageError if emulated devices are to run in virtual time beside real ones."""
+        """Return this file; raise UsageError if emulated devices, in virtual time, stand beside real ones."""
         real = [name for name, entry in self.entries().items() if not entry.emulated]
-        if self.emulated and real and self.emulation.time == "virtual":
+        if self.emulated and real:
             raise UsageError(
                 f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
-                hint="Write `time: real` under `emulation:`.",
+                hint="Use the rig file that `tactbench emulate --rig-file FILE` prints.",
             )
         return self
 

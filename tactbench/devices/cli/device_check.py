@@ -1,72 +1,60 @@
-"""The devices of a rig file, one by one: does it open, who is it, what does it send while nothing touches it."""
+"""Check of the devices of a rig file, one by one: opening, identity, and what each sends while nothing touches it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from tactbench.core.conformance.streams import good, marks_of
+from tactbench.core.conformance.streams import good, joined, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
-from tactbench.core.samples import Block, Quality, join_blocks
+from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver
 from tactbench.devices.rig_devices import descriptor_of, open_driver
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Clock
 
-Record = dict[str, Any]
-
 READ_S = 0.25
-"""Longest wait of one read, so that the end is not missed by more."""
-MOST_NAMED = 6
-"""Channels whose means are stated one by one."""
+"""Longest wait of one read."""
 RATE_TOLERANCE = 0.02
-"""A rate further from its nominal one is a problem. Assumed: quartz is a hundred times better, a timer of whole
-milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
+"""Relative difference from the stated rate that is a problem. Assumed: quartz is a hundred times better, a timer of
+whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
 HELD_S = 0.016
-"""How long a usual USB serial adapter may hold back what has come (FTDI's latency timer as delivered) [s]."""
+"""How long a usual USB serial adapter may hold data back (FTDI's latency timer as delivered) [s]."""
+_CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connected?)",
+           "SUSPECT": " (cable, shield, ground?)", "SATURATED": " (is something touching it?)"}  # fmt: skip
 
 
 @dataclass
 class DeviceCheck:
-    """What became of one device."""
+    """Result of the check of one device."""
 
     name: str
-    """Its name in messages."""
+    """Name in messages."""
     device: str
     """Sensor or device of that name in the registry."""
     link: str
     emulated: bool
     identity: dict[str, str] = field(default_factory=dict)
-    streams: list[Record] = field(default_factory=list)
-    """What came of its streams, a record for each kind of channel; units in the names of its keys."""
+    streams: list[dict[str, Any]] = field(default_factory=list)
+    """Statistics of its streams, a record for each kind of channel; keys end in their units."""
     counts: dict[str, int] = field(default_factory=dict)
-    """What its driver counted."""
+    """Counts of its driver."""
     remarks: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    """What is wrong, each with the next step."""
+    """Problems, each with the next step."""
 
 
 def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, clock: Clock) -> list[DeviceCheck]:
-    """Open, ask and read each device on a line in turn; what is wrong with one is in its check and ends no other.
+    """Open, identify and read each device for some seconds; a problem of one is in its check and ends no other.
 
-    Parameters
-    ----------
-    seconds
-        How long each device is read.
-    clock
-        The host's.
-
-    Notes
-    -----
-    A motor is opened and asked who it is; it is never started. Emulated devices are not opened.
+    A motor is opened and identified, and never started. Emulated devices are not opened.
     """
     checks = []
     for name, entry in rig_file.entries().items():
@@ -99,78 +87,59 @@ def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: 
 
 def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
     driver.start()
-    blocks: dict[str, list[Block]] = {stream.name: [] for stream in driver.streams}
-    ordered = {name: SequenceCheck() for name in blocks}
+    order = {stream.name: SequenceCheck() for stream in driver.streams}
+    blocks: list[Block] = []
     until_ns = clock() + round(seconds * 1e9)
     try:
         while (left_s := (until_ns - clock()) * 1e-9) > 0:
-            for block in driver.read(min(READ_S, left_s)):
-                kept = ordered[block.stream](block)
-                if kept is not None:
-                    blocks[block.stream].append(kept)
+            blocks += filter(None, (order[block.stream](block) for block in driver.read(min(READ_S, left_s))))
     finally:
         driver.stop()
-        for stream in driver.streams:
-            if blocks[stream.name]:
-                found = list(_records(check.name, stream, blocks[stream.name], ordered[stream.name]))
-                check.streams += found
-                check.problems += _problems(found[0])
-            else:
-                check.problems.append(
-                    f"Nothing came of its stream {stream.name} within {seconds:g} s. {ByteLink.silence_hint}"
-                )
+    for name, stream in joined("driver.read", driver.streams, blocks).items():
+        if len(stream.data):
+            about, problems = _about(check.name, stream, order[name])
+            check.streams += [{**about, **record} for record in _noise(stream)]
+            check.problems += problems
+        else:
+            check.problems.append(f"Nothing came of its stream {name} within {seconds:g} s. {ByteLink.silence_hint}")
 
 
-def _records(device: str, spec: StreamSpec, came: Sequence[Block], ordered: SequenceCheck) -> Iterator[Record]:
-    """Yield what came of a stream, a record for each kind of channel in one unit."""
-    whole, hz, line = join_blocks([replace(block, quality=marks_of(block)) for block in came]), None, None
-    values, marks, times = good(whole), np.bitwise_or.reduce(marks_of(whole), axis=1), whole.t_ns
+def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[str, Any], list[str]]:
+    """Return rate, losses and clock of a stream, and their problems."""
+    name, rows, times, stated_hz = stream.spec.name, len(stream.data), stream.t_ns, stream.spec.rate_hz
+    marks, hz, drift, problems = np.bitwise_or.reduce(marks_of(stream), axis=1), None, None, []
     if times is not None and times[-1] > times[0]:
-        first = times[: len(came[0].data)]
-        hz = (len(times) - (1 if first[-1] > first[0] else len(first))) / (times[-1] - times[0]) * 1e9
-    if times is not None and whole.device_ns is not None:
-        fit = ClockFit()
-        fit.add(whole.device_ns, times)
-        line = fit.segments()[-1]
-    about: Record = {
-        "device": device, "stream": spec.name, "rows": len(values), "hz": hz, "stated_hz": spec.rate_hz,
-        "lost": ordered.gaps, "twice_or_late": ordered.duplicates + ordered.late,
-        "marked": {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))},
-        "drift_ppm": None if line is None else line.drift * 1e6,
-        "clock_error_us": None if line is None or line.bound_ns is None else line.bound_ns * 1e-3,
-    }  # fmt: skip
-    groups: dict[tuple[str, str], list[int]] = {}
-    for place, channel in enumerate(spec.channels):
-        groups.setdefault((channel.kind, channel.unit), []).append(place)
-    for (kind, unit), places in groups.items():
-        columns = {spec.channels[place].name: values[np.isfinite(values[:, place]), place] for place in places}
-        columns = {name: column for name, column in columns.items() if len(column) > 1}
-        sds = {name: float(column.std(ddof=1)) for name, column in columns.items()}
-        noisiest = max(sds, key=sds.__getitem__, default=None)
-        means = {name: float(column.mean()) for name, column in columns.items()}
-        if len(means) > MOST_NAMED:
-            means = {"lowest": min(means.values()), "highest": max(means.values())}
+        hz = float(np.count_nonzero(times > times[0]) / (times[-1] - times[0]) * 1e9)
+        allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * hz / rows
+        if stated_hz is not None and abs(hz / stated_hz - 1) > allowed:
+            problems.append(f"Stream {name} came at {hz:.4g} Hz, stated are {stated_hz:.4g} Hz.")
+        if stream.device_ns is not None:
+            fit = ClockFit()
+            fit.add(stream.device_ns, times)
+            drift = fit.segments()[-1].drift
+            if refused := wrong_rate(name, drift, round(1e9 * rows / hz)):
+                problems.append(f"{refused}. Correct device_ns in its driver.")
+    marked = {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))}
+    lacking = {"lost": order.gaps, "twice or late": order.duplicates + order.late, **marked}
+    texts = [f"{number} {what}{_CAUSES.get(what, '')}" for what, number in lacking.items() if number]
+    if texts:
+        problems.append(f"Stream {name}, of {rows} rows: {', '.join(texts)}.")
+    return {
+        "device": device, "stream": name, "rows": rows, "hz": hz, "stated_hz": stated_hz, "lost": order.gaps,
+        "marked": marked, "drift_ppm": None if drift is None else drift * 1e6,
+    }, problems  # fmt: skip
+
+
+def _noise(stream: StreamData) -> Iterator[dict[str, Any]]:
+    """Yield the largest standard deviation of each kind of channel in one unit, and the constant channels."""
+    values, channels = good(stream), stream.spec.channels
+    for kind, unit in dict.fromkeys((channel.kind, channel.unit) for channel in channels):
+        own = [place for place, one in enumerate(channels) if (one.kind, one.unit) == (kind, unit)]
+        columns = {channels[place].name: values[np.isfinite(values[:, place]), place] for place in own}
+        sds = {name: float(column.std(ddof=1)) for name, column in columns.items() if len(column) > 1}
+        noisiest = max(sds, key=sds.__getitem__, default="")
         yield {
-            **about, "kind": kind, "unit": unit, "mean": means,
-            "sd_median": float(np.median(list(sds.values()))) if sds else None,
-            "sd_largest": None if noisiest is None else sds[noisiest], "noisiest": noisiest,
+            "kind": kind, "unit": unit, "sd_largest": sds.get(noisiest), "noisiest": noisiest,
+            "mean": float(np.nanmean(values[:, own])) if sds else None,
             "constant": [name for name, sd in sds.items() if sd == 0],
         }  # fmt: skip
-
-
-def _problems(found: Record) -> list[str]:
-    problems, name, rows, rate_hz, stated_hz = [], found["stream"], found["rows"], found["hz"], found["stated_hz"]
-    if rate_hz is not None and stated_hz is not None:
-        allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * rate_hz / rows
-        if abs(rate_hz / stated_hz - 1) > allowed:
-            problems.append(f"Stream {name} came at {rate_hz:.4g} Hz, stated are {stated_hz:.4g} Hz.")
-    if found["drift_ppm"] is not None and rate_hz:
-        refused = wrong_rate(name, 1e-6 * found["drift_ppm"], round(1e9 * rows / rate_hz))
-        problems += [f"{refused}. Correct device_ns in its driver."] if refused else []
-    wrong = {"lost": found["lost"], "twice or late": found["twice_or_late"], **found["marked"]}
-    told = [f"{number} {what}{_CAUSES.get(what, '')}" for what, number in wrong.items() if number]
-    return [*problems, f"Stream {name}, of {rows} rows: {', '.join(told)}."] if told else problems
-
-
-_CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connected?)",
-           "SUSPECT": " (cable, shield, ground?)", "SATURATED": " (is something touching it?)"}  # fmt: skip

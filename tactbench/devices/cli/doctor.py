@@ -1,4 +1,4 @@
-"""``tactbench doctor``: what this machine has for devices, and whether those of a rig answer."""
+"""``tactbench doctor``: this machine's ports and buses, and whether the devices of a rig answer."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str | None, shape: str) -> None:
     """Check ports, permissions, buses, extras and the clock, and the devices of a rig.
 
-    Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. What does not work
-    comes first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
+    Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
+    printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
     opened; 2 for a wrong rig file.
     """
     import time
@@ -60,8 +60,8 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
     of_rig = [f"refused: {text}" for text in (would.problems if would else ())]
     of_rig += [f"{check.name}: {text}" for check in checks for text in check.problems]
     if shape == "json":
-        said = {"tables": list(map(asdict, would.tables)), "problems": would.problems} if would else None
-        about = {"host": list(map(asdict, host)), "rig": said,
+        of_file = {"tables": list(map(asdict, would.tables)), "problems": would.problems} if would else None
+        about = {"host": list(map(asdict, host)), "rig": of_file,
                  "devices": list(map(asdict, checks)), "problems": of_rig + denied}  # fmt: skip
         click.echo(json_text(about, indent=1))
     else:
@@ -89,7 +89,7 @@ def _print(
     print_records([one for check in checks for one in check.streams], "table", title="untouched")
     fields = []
     for check in checks:
-        said = [*check.remarks, *(f"{name} {value}" for name, value in {**check.identity, **check.counts}.items())]
-        fields.append((check.name, f"{check.device}, {check.link}: {', '.join(said)}"))
+        facts = [*check.remarks, *(f"{name} {value}" for name, value in {**check.identity, **check.counts}.items())]
+        fields.append((check.name, f"{check.device}, {check.link}: {', '.join(facts)}"))
     works = (f"{one.name} ({one.text})" if one.text else one.name for one in host if one.state == "works")
     print_fields([*fields, ("works", ", ".join(works))])

@@ -42,7 +42,7 @@ def command(names: tuple[str, ...], rig_file: Path | None) -> None:
     file = load_rig_file(rig_file, registry) if rig_file is not None else _named(registry, names)
     if not file.emulated:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
-    serve(file, registry, started=_say_where, told=remark)
+    serve(file, registry, started=_print_file, progress=remark)
 
 
 def _named(registry: Registry, names: Sequence[str]) -> RigFile:
@@ -69,7 +69,7 @@ def _named(registry: Registry, names: Sequence[str]) -> RigFile:
     return RigFile(rig="bench", sensors=sensors, force=others.pop(FORCE, None), devices=others)
 
 
-def _say_where(live: RigFile) -> None:
+def _print_file(live: RigFile) -> None:
     """Print the rig file that opens the devices, and say how to record with it."""
     import yaml
 

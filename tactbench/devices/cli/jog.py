@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -28,9 +27,9 @@ if TYPE_CHECKING:
     from tactbench.links.link import Clock
 
 STEP_M, LONGEST_M, SPEED_M_S = 0.1e-3, 1e-3, 1e-3
-"""Of `+` and `-`; of any step; and the speed of all (assumed: a hand reaches the emergency stop meanwhile)."""
+"""Length of `+` and `-`; the longest step; the speed (assumed: a hand reaches the emergency stop meanwhile)."""
 LOOK_S, OLD_S = 2e-3, 0.1
-"""Between two looks at axis and force; and the largest age of a force (assumed: three samples of a slow sensor)."""
+"""Longest wait for a force sample; and its largest age (assumed: three samples of a slow sensor)."""
 
 
 def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, name: str) -> None:
@@ -44,7 +43,7 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
         If one of them does not answer, or fails.
     """
     file = would.file if would else None
-    if rig is None or would is None or file is None or file.force is None or name not in file.devices:
+    if rig is None or file is None or would is None or file.force is None or name not in file.devices:
         known = ", ".join(file.devices) if file and file.force else "none beside a force sensor"
         raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Name one with --rig-file FILE; it has {known}.")
 
@@ -69,68 +68,68 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
 
 def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float,
                   ask: Callable[[str], str], say: Callable[[str], None]) -> None:  # fmt: skip
-    """Take the force's zero, home the axis if it is not, and move it as is answered, until an empty answer.
+    """Take the force's zero, home the axis if it is not, and move it by the answers, until an empty one.
 
-    The axis halts where the norm of the force is at `ceiling_n`, or the force is not known; what is asked for then is
-    carried out only if it goes back.
+    The axis halts where the norm of the force is at `ceiling_n`, or the force is not known; after that only a step back
+    is carried out.
     """
     clock, pressing = axis.clock, PressingForce(entry, force.streams)
     for device in (force, axis):
         device.identify()
         device.start()
     (stream,) = force.streams
-    watch, until_ns = ForceWatch(stream), clock() + round(1e9 * max(entry.zero_s, OLD_S))
-    came = []
+    watch, until_ns, blocks = ForceWatch(stream), clock() + round(1e9 * max(entry.zero_s, OLD_S)), []
     while clock() < until_ns:
-        came += force.read(LOOK_S)
+        blocks += force.read(LOOK_S)
         axis.update(0.0)
-    low, high = axis.facts.limits
-    zero = tuple(pressing.zero(came)[stream.name].tolist())
     limits = Limits(
-        force_ceiling_n=ceiling_n, travel_ceiling_n=ceiling_n, touch_n=ceiling_n / 2, travel_m=(low, high),
+        force_ceiling_n=ceiling_n, travel_ceiling_n=ceiling_n, touch_n=ceiling_n / 2, travel_m=axis.facts.limits,
         step_m=LONGEST_M, speed_m_s=SPEED_M_S, heartbeat_s=OLD_S, force_age_s=OLD_S, channel=pressing.column,
-        sign=pressing.sign, zero=zero,
+        sign=pressing.sign, zero=tuple(pressing.zero(blocks)[stream.name].tolist()),
         same_samples=10**9 if entry.emulated else Limits.same_samples,  # an emulated sensor at rest has no noise
     )  # fmt: skip
 
+    back = 0
+
     def look() -> str:
-        """Look at axis and force once; return what is wrong with the force."""
+        """Read axis and force once; return the problem with the force."""
         axis.update(0.0)
         found = [watch.take(block, limits, travelling=True) for block in force.read(LOOK_S)]
-        wrong = next(filter(None, found), None) or watch.old(clock(), limits)
-        return ": ".join(wrong) if wrong else ""
+        problem = next(filter(None, found), None) or watch.old(clock(), limits)
+        return ": ".join(problem) if problem else ""
+
+    def look_afresh() -> str:
+        """Read until a sample comes that is received from now on; return the problem with the force."""
+        since_ns = clock()
+        while not (wrong := look()) and watch.t_ns < since_ns:
+            pass
+        return wrong
 
     def answer_to(text: str) -> str:
-        """Return what is answered; until then axis and force are looked at, so that nothing waits in their links."""
-        given: list[Any] = []
+        """Return the answer to a prompt, once the force samples that have waited meanwhile are read."""
+        answer, since_ns = ask(text).strip(), clock()
+        while watch.t_ns < since_ns and clock() < since_ns + 1e9 * OLD_S:
+            for block in force.read(LOOK_S):
+                watch.take(block, None)
+        return answer
 
-        def wait() -> None:
-            try:
-                given.append(ask(text))
-            except BaseException as error:
-                given.append(error)
-
-        thread = threading.Thread(target=wait, daemon=True)
-        thread.start()
-        while thread.is_alive() or math.isnan(watch.force_n):
-            if look() and not thread.is_alive():
-                break
-        if isinstance(given[0], BaseException):
-            raise given[0]
-        return str(given[0]).strip()
-
-    def carry_on(way: int) -> None:
-        """Look until the axis stands; halt it where the force is wrong, unless the way leads back from there."""
+    def move(step_m: float) -> None:
+        """Carry out a step, unless the force forbids it; halt where it goes wrong, unless the way leads back."""
+        nonlocal back
+        way = int(math.copysign(1, step_m))
+        if (wrong := look_afresh()) and way != back:
+            raise RigError(f"It does not move further that way: {wrong}.", hint="Move back.")
         most_n, halted = abs(watch.force_n) + ceiling_n, ""
+        axis.move_to(axis.position + step_m, min(SPEED_M_S, axis.facts.speed))
         while axis.moving:
             wrong = look()
             if wrong and not halted and (way != back or not abs(watch.force_n) < most_n):
                 axis.halt()
                 halted = wrong
+        back = -way
         if halted:
             say(f"The {name} was halted: {halted}")
 
-    back, speed = 0, min(SPEED_M_S, axis.facts.speed)
     try:
         if not (axis.homed or axis.find_home()):
             clear = "Is it clear of the sensor, and the emergency stop within reach? Write yes: it is homed. "
@@ -140,26 +139,20 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         if not axis.enabled:
             axis.enable()
         while True:
-            wrong = look()
+            wrong = look_afresh()
             where = f"{name} at {1e3 * axis.position:.3f} mm, {watch.force_n:+.3f} N{f' ({wrong})' if wrong else ''}"
             answer = answer_to(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: so many mm; Enter alone: end. ")
             if not answer:
                 return
             try:
                 step_m = {"+": STEP_M, "-": -STEP_M}.get(answer) or 1e-3 * float(answer)
-                way = int(math.copysign(1, step_m))
                 if not abs(step_m) <= LONGEST_M:
                     raise UsageError(f"{answer} mm is longer than a step may be, {1e3 * LONGEST_M:g} mm.")
-                if (wrong := look()) and way != back:
-                    raise RigError(f"It does not move further that way: {wrong}.", hint="Move back.")
-                axis.move_to(axis.position + step_m, speed)
+                move(step_m)
             except ValueError:
                 say(f"{answer!r} is neither +, - nor a number.")
             except TactbenchError as error:
                 say(str(error))
-            else:
-                carry_on(way)
-                back = -way
     finally:
         if axis.moving:
             axis.halt()

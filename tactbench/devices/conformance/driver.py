@@ -28,7 +28,7 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, FloatArray, Quality, StreamData
+from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
@@ -97,6 +97,16 @@ class Opened(NamedTuple):
     def channels(self) -> list[ChannelSpec]:
         """Return the channels of all streams."""
         return [channel for stream in self.driver.streams for channel in stream.channels]
+
+    @property
+    def slowest_hz(self) -> float:
+        """Rate of the slowest stream."""
+        return min(stream.rate_hz or 100.0 for stream in self.driver.streams)
+
+    @property
+    def due_s(self) -> float:
+        """Time at which the emulator sends next by itself; infinite: not before something comes."""
+        return float(self.emulator.next_s()) if hasattr(self.emulator, "next_s") else math.inf
 
     def call(self, name: str, *given: Any) -> Any:
         """Call a method of the driver; what it raises is a failure that names it."""
@@ -253,14 +263,18 @@ def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
     return low + share * span, span / (LEVELS - 1) / 4 + rounding
 
 
+def _skip_motor(subject: Subject) -> None:
+    if getattr(subject.descriptor, "kind", "") == "motor":
+        skip("what a motor's position is, its rig decides")
+
+
 @check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
     """Swapped channels or bytes, a lost sign or gram-force give plausible readings of something else.
 
     Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
     """
-    if getattr(subject.descriptor, "kind", "") == "motor":
-        skip("what a motor's position is, its rig decides")
+    _skip_motor(subject)
     place, sensed = 1, dict[str, float]()
     with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
         every = opened.channels()
@@ -375,21 +389,20 @@ def driver_counts_on(subject: Subject) -> None:
         return max(len(stream.data) for stream in found.values())
 
     with emulated(subject, started=False) as (opened, _):
-        quiet = not math.isfinite(_due_s(opened.emulator))
+        quiet = not math.isfinite(opened.due_s)
         opened.call("start")
         first, before = opened.read().values(), _counters(opened.emulator)
         clocked, numbered = (any(getattr(one, name) is not None for one in first) for name in ("device_ns", "sequence"))
         if not clocked and not numbered:
             skip("its device numbers no samples, and has no clock")
-        slowest = min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
-        some_s, until_s = 4 * BEFORE_WRAP / slowest, time.process_time() + WORK_S
+        some_s, until_s = 4 * BEFORE_WRAP / opened.slowest_hz, time.process_time() + WORK_S
         rows, now = counted(opened, READ_S + some_s), _counters(opened.emulator)
         moved = [one for one, value in now.items() if abs(value - before.get(one, value) - rows) <= 0.1 * rows]
         for wrap, name in itertools.product(WRAPS, moved if numbered else ()):
             held = vars(opened.emulator)
             held[name] = type(held[name])(wrap - BEFORE_WRAP)
             with suppress(struct.error, OverflowError):  # one of fewer bits
-                opened.read(1 / slowest)
+                opened.read(1 / opened.slowest_hz)
                 counted(opened, some_s)
         while numbered and not moved and rows < WRAP_ROWS:
             if time.process_time() > until_s:
@@ -408,7 +421,7 @@ def driver_waits_and_stops(subject: Subject) -> None:
     Wait in the link alone, and no longer than `timeout_s` in all; never sleep. Let the device stop in stop().
     """
     with emulated(subject, started=False) as (opened, devices):
-        quiet = not math.isfinite(_due_s(opened.emulator))
+        quiet = not math.isfinite(opened.due_s)
         opened.call("start")
         for wait_s in (WAIT_S, WAIT_S, 0.0):
             began_ns = opened.clock()
@@ -416,27 +429,19 @@ def driver_waits_and_stops(subject: Subject) -> None:
             took_s = (opened.clock() - began_ns) * 1e-9
             if took_s > wait_s + SHORT_S:
                 fail("driver.read", f"read({wait_s:g}) took {took_s:.2g} s")
-        spent = [(time.perf_counter(), time.thread_time())]
+        idle_s = []
         for _ in range(TRIES):
+            began_s = time.perf_counter() - time.thread_time()
             opened.driver.read(0.0)
-            spent.append((time.perf_counter(), time.thread_time()))
-        wall_s, busy_s = min((b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(spent))
-        if wall_s > SLEEP_S and busy_s < wall_s / 2:
-            fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s")
+            idle_s.append(time.perf_counter() - time.thread_time() - began_s)
+        if min(idle_s) > SLEEP_S:
+            fail("driver.read", f"read(0) sleeps for {min(idle_s):.2g} s")
         opened.call("stop")
         devices.advance(opened.clock() + round(1e9 * WAIT_S))
-        told = getattr(type(opened.driver), "quiet", None)
-        # Of some devices no source says how they are stopped, and others answer whenever they are asked.
-        if (quiet if told is None else told is not RowDriver.quiet) and math.isfinite(_due_s(opened.emulator)):
+        # Of some devices no source says how they are stopped.
+        own = getattr(type(opened.driver), "quiet", None)
+        if (quiet if own is None else own is not RowDriver.quiet) and math.isfinite(opened.due_s):
             fail("driver.stop", "the device goes on sending after it")
-        asks = getattr(type(opened.driver), "ask", None) is not RowDriver.ask
-        if not asks and told is not RowDriver.quiet and any(len(one.data) for one in opened.driver.read(0.0)):
-            fail("driver.stop", "rows are read after it")
-
-
-def _due_s(emulator: Any) -> float:
-    """Return when an emulator sends by itself; infinite: not before something comes."""
-    return float(emulator.next_s()) if hasattr(emulator, "next_s") else math.inf
 
 
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
@@ -446,44 +451,39 @@ def driver_follows_a_step(subject: Subject) -> None:
     State the delay of a filter in `link_delay`; give no row before the device has one, or mark it as MISSING; keep the
     rows of a block in the order of their time.
     """
-    if getattr(subject.descriptor, "kind", "") == "motor":
-        skip("what a motor's position is, its rig decides")
-    with emulated(subject, started=False) as (opened, _):
-        every, slowest = opened.channels(), min(stream.rate_hz or 100.0 for stream in opened.driver.streams)
-    low, high = ({one.name: _reading(one, share)[0] for one in every} for share in STEP)
-    stated, row_s, steps_s = getattr(subject.spec, "link_delay", None), max(0.01, 1 / slowest), list[float]()
-
-    def shares(stream: StreamData) -> FloatArray:
-        """Return (n,) how far each row is from the low level to the high one; NaN where a channel has no reading."""
-        ends = [np.array([level[one.name] for one in stream.spec.channels]) for level in (low, high)]
-        return np.asarray(((good(stream) - ends[0]) / (ends[1] - ends[0])).mean(axis=1))
+    _skip_motor(subject)
+    step_s = math.inf
 
     def senses(t_s: float) -> dict[str, float]:
-        return high if sum(t_s >= one for one in steps_s) == 1 else low
+        return {one.name: _reading(one, STEP[int(t_s >= step_s)])[0] for one in every}
 
+    with emulated(subject, started=False) as (opened, _):
+        every, slowest = opened.channels(), opened.slowest_hz
+    row_s = max(0.01, 1 / slowest)
     with emulated(subject, senses=senses) as (opened, devices):
-        steps_s.append(1e-9 * opened.clock() + READ_S)
-        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / slowest)
-        steps_s.append(1e-9 * opened.clock() + 4 * row_s)
-        devices.advance(opened.clock() + round(8e9 * row_s))  # this step lies in the middle of a block
-        after = opened.blocks(READ_S)
+        blocks = opened.blocks(READ_S)
+        batches = {
+            name: max(len(one.data) for one in blocks if one.stream == name) for name in {b.stream for b in blocks}
+        }
+        step_s = 1e-9 * opened.clock() + 4 * row_s
+        devices.advance(opened.clock() + round(8e9 * row_s))  # the step lies in the middle of a block
+        blocks += opened.blocks(READ_S + 2 * LAG_ROWS / slowest)
+    stated = getattr(subject.spec, "link_delay", None)
     for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
-        found = shares(stream)
+        low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
+        found = ((good(stream) - low) / (high - low)).mean(axis=1)  # from 0 before the step to 1 after it
         whole = np.isfinite(found)
         found, before = found[whole], np.flatnonzero(found[whole] < STEP[1])
         if stream.t_ns is None or len(before) in (0, len(found)):  # a stream that gives no steady level
             continue
         if abs(found[0]) > STEP[0]:
             fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
-        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - steps_s[0]
-        batch = max(len(one.data) for one in blocks if one.stream == name)
-        rows_s = (LAG_ROWS + batch) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found)
+        if (np.diff(found) < -STEP[0]).any():
+            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
+        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - step_s
+        rows_s = (LAG_ROWS + batches.get(name, 0)) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found)
         if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
             fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
-    for name, stream in joined("driver.read", opened.driver.streams, after).items():
-        found = shares(stream)
-        if (np.diff(found[np.isfinite(found)]) > STEP[0]).any():
-            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
 
 
 @check("sensor", "device", needs="driver-reads")

@@ -29,47 +29,47 @@ SPI_HZ = 4_400_000
 10 MHz."""
 HELD = 8
 """Batches that an emulated bridge holds, as the firmware of docs/links.md does."""
-BAUDS = (115200, 230400, 460800, 921600, 1_000_000, 2_000_000, 3_000_000)
-"""Usual rates of serial lines [bit/s]."""
+BAUD = 3_000_000
+"""Rate in the address of a serial line [bit/s]: above that of any device, since a pseudo-terminal has none."""
 
 
 @dataclass(frozen=True)
 class EmulatedDevice:
-    """A device as a model, and the link it is behind."""
+    """Device as a model, and the kind of its link."""
 
     link: EmulatedLink
     emulator: DeviceEmulator | SpiDeviceEmulator
     """SpiDeviceEmulator on `spi`, DeviceEmulator on the others."""
     faults: tuple[LinkFault, ...] = ()
-    """Of the link; the device's own are in its emulator."""
+    """Faults of the link; the device's own are in its emulator."""
     baud: int | None = None
-    """Of a serial line, bits per second, for its address; None: derived from what the device sends."""
+    """Rate of a serial line [bit/s], for its address; None: `BAUD`."""
 
 
 class EmulatedDevices:
-    """Devices that run from now until :meth:`close` or the end of the ``with`` block.
+    """Emulated devices that run until :meth:`close` or the end of the ``with`` block.
 
     Parameters
     ----------
     devices
-        By name.
+        Devices by name.
     time
-        `virtual`: time stands until a link's wait or :meth:`advance` lets it go on; one thread, no link of the system,
-        and the same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that
-        other processes may open, too.
+        `virtual`: time advances by the wait of a link or :meth:`advance`; one thread, no link of the system, and the
+        same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that other
+        processes may open, too.
 
     Attributes
     ----------
     clock
-        Nanoseconds since the devices began: what drivers and links are to use. Emulators, faults and senses see the
-        same time in seconds.
+        Nanoseconds since the devices began, for drivers and links; the seconds of emulators, faults and senses are the
+        same time.
     addresses
-        By device: what a rig file says to open its link, also from another process; empty in virtual time.
+        Address of the link by device, for a rig file, also of another process; empty in virtual time.
 
     Raises
     ------
     UsageError
-        If this system has no links of that kind.
+        If this system has no link of that kind.
     """
 
     def __init__(
@@ -82,10 +82,8 @@ class EmulatedDevices:
         self._virtual = VirtualTime() if time == "virtual" else None
         began_ns = wall.monotonic_ns()
         self.clock: Clock = self._virtual or (lambda: wall.monotonic_ns() - began_ns)
-        self._lines = {
-            name: Line(_on_its_line(device, real=self._virtual is None), device.faults)
-            for name, device in self._devices.items()
-        }
+        real = self._virtual is None
+        self._lines = {name: Line(_far_end(one, real=real), one.faults) for name, one in self._devices.items()}
         self.addresses: dict[str, str] = {}
         self._server: RealTimeServer | None = None
         if self._virtual is not None:
@@ -111,17 +109,17 @@ class EmulatedDevices:
             self._whole()
 
     def close(self) -> None:
-        """End the devices and give back the links of the system; once closed, this does nothing."""
+        """End the devices and release the links of the system; a second call does nothing."""
         if self._server is not None:
             self._server.close()
 
     def advance(self, until_ns: int) -> None:
-        """Let time go on until `clock` says so much: computed in virtual time, waited for in real time.
+        """Advance until `clock` is at a nanosecond: computed in virtual time, waited for in real time.
 
         Raises
         ------
         Exception
-            What an emulator raised, in real time also since the last call.
+            The error of an emulator, in real time also one since the last call.
         """
         if self._virtual is not None:
             self._virtual.advance(until_ns)
@@ -146,11 +144,11 @@ class EmulatedDevices:
         return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
     def emulator_of(self, name: str) -> DeviceEmulator | SpiDeviceEmulator:
-        """Return a device's model."""
+        """Return the model of a device."""
         return self._devices[name].emulator
 
     def opener(self, name: str) -> Callable[[], Link]:
-        """Return what opens the host's end of a device's link, as drivers are given it."""
+        """Return the function that opens the host's end of a device's link, for DriverSettings."""
         return partial(self.open_link, name)
 
     def _whole(self) -> None:
@@ -158,9 +156,9 @@ class EmulatedDevices:
             raise self._server.error
 
 
-def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
-    """Return the device as its line sees it: an SPI bus behind a bridge, in real time a CAN bus behind an adapter."""
-    emulator: Any = device.emulator  # which of the two protocols it has, the kind of link says
+def _far_end(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
+    """Return the far end of a line: an SPI device behind a bridge, in real time a CAN device behind an adapter."""
+    emulator: Any = device.emulator
     if device.link == "spi":
         emulator = BridgeEmulator(emulator.exchange, holds=HELD)
     elif device.link == "can" and real:
@@ -173,11 +171,8 @@ def _end_of(device: EmulatedDevice) -> End:
         case "datagram":
             return UdpEnd()
         case "bytes":
-            # The least usual rate that carries what it sends, and a quarter more.
-            needed = 1.25 * 10 * getattr(device.emulator, "bytes_per_s", 0.0)
-            baud = device.baud or next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
-            return PseudoTerminal(f"serial://{{}}?baud={baud}")
+            return PseudoTerminal(f"serial://{{}}?baud={device.baud or BAUD}")
         case "spi":
             return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
-    # The bit rate is a statement; nothing here starts anew when its port is opened.
+    # The bit rate has no effect, and nothing here restarts when its port is opened.
     return PseudoTerminal("can://slcan/{}?bitrate=1000000&sleep_after_open=0")

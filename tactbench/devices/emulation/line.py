@@ -1,4 +1,4 @@
-"""The far end of one emulated link: the device as a model, and what is wrong with the link."""
+"""The far end of one emulated link: the device as a model, and the faults of the link."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ Piece: TypeAlias = bytes | CanFrame
 """Bytes of a stream, a CAN frame, a datagram."""
 
 _AGAIN_S = 1e-6
-"""Assumed: no emulated device does two things within this time that could not be one. An emulator that has something to
-do at the moment at which it was just polled, by rounding or by mistake, is polled again this much later: time goes on
-whatever it answers."""
+"""Assumed: two events of a device within this time are one. An emulator whose next event is due at the moment at which
+it was just polled, by rounding or by mistake, is polled again this much later, so that time always advances."""
 
 
 @dataclass(frozen=True)
 class LinkFault(Fault):
-    """A fault of the link itself, which every emulated device can have."""
+    """Fault of the link itself, which every emulated device can have."""
 
     known: ClassVar[Mapping[str, str]] = LINK_FAULTS
     delay_s: float = 0.05
@@ -30,7 +29,7 @@ class LinkFault(Fault):
 
 
 def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[str, ...]]:
-    """Return the faults of the link, and those that are the device's own business, as text.
+    """Return the faults of the link, and the device's own as text.
 
     Raises
     ------
@@ -43,20 +42,20 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
 
 
 class Line:
-    """An emulated device and its end of the link; who carries pieces to the host sets :attr:`deliver`.
+    """Emulated device and its end of the link.
 
     Parameters
     ----------
     emulator
         The device.
     faults
-        Of the link.
+        Faults of the link.
 
     Attributes
     ----------
     deliver
-        Called with the second and the piece, in order of time, for what comes out at the host's end; None: nobody has
-        that open, and it is dropped.
+        Called with the second and the piece, in order of time, at the host's end; None: that is not open, and pieces
+        are dropped.
     gone
         Whether the link was unplugged by a fault.
     """
@@ -71,7 +70,7 @@ class Line:
         self._out: deque[tuple[float, Piece]] = deque()
 
     def feed(self, piece: Piece, now_s: float) -> None:
-        """Take what the host sends at `now_s`; deliver what is due by then."""
+        """Take a piece from the host at `now_s`, and deliver all pieces that are due."""
         self.poll(now_s)
         if self.gone:
             return
@@ -79,7 +78,7 @@ class Line:
         self.poll(now_s)
 
     def poll(self, now_s: float) -> None:
-        """Let the device go on to `now_s`, and deliver what is due by then."""
+        """Advance the device to `now_s`, and deliver all pieces that are due."""
         if self.gone:
             return
         until_s = min(now_s, self._unplugged_s)
@@ -93,17 +92,13 @@ class Line:
         self._next_s = math.inf if self.gone else self._due_s(until_s)
 
     def next_s(self) -> float:
-        """Return when :meth:`poll` has something to do next; infinite: not before something comes."""
+        """Return the second of the next event; infinite: none before a piece comes."""
         if self._next_s is None:
             self._next_s = self._due_s(-math.inf)
         return self._next_s
 
     def _due_s(self, polled_s: float) -> float:
-        due_s = min(
-            self._emulator.next_s(),
-            self._out[0][0] if self._out else math.inf,
-            self._unplugged_s,
-        )
+        due_s = min(self._emulator.next_s(), self._out[0][0] if self._out else math.inf, self._unplugged_s)
         return due_s if due_s > polled_s else polled_s + _AGAIN_S
 
     def _send(self, sent: Sequence[Sent]) -> None:

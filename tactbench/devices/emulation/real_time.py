@@ -19,11 +19,11 @@ from tactbench.links.datagram_link import LARGEST_DATAGRAM
 from tactbench.links.link import Clock
 
 STOP_S = 0.05
-"""Within which a server that has nothing to do notices that it is to end."""
+"""Longest wait of a server without events, after which it checks whether it is to end."""
 
 
 class PseudoTerminal:
-    """A serial line: its address is that of the terminal, which stays while hosts open and close it.
+    """Serial line: its address is that of the terminal, which stays while hosts open and close it.
 
     Parameters
     ----------
@@ -40,35 +40,35 @@ class PseudoTerminal:
         import tty
 
         self._master, self._slave = os.openpty()
-        # Before a host opens it and sets it up, a terminal would echo what the device sends.
+        # Before a host opens it and sets it up, a terminal would echo the device's own bytes.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.address = pattern.format(os.ttyname(self._slave))
 
     def fileno(self) -> int:
-        """Return what becomes readable when something comes."""
+        """Return the file descriptor, which is readable when data have come."""
         return self._master
 
     def received(self) -> list[Piece]:
-        """Return what has come."""
+        """Return the pieces received."""
         with suppress(BlockingIOError):
             return [os.read(self._master, 65536)]
         return []
 
     def send(self, t_s: float, piece: Piece) -> None:
-        """Send to the host; what the system does not take at once is lost, as on a line that nobody reads."""
+        """Send to the host; data that the system does not take at once are lost, as on a line without a reader."""
         assert isinstance(piece, bytes)
         with suppress(BlockingIOError):
             os.write(self._master, piece)
 
     def close(self) -> None:
-        """Give the link back to the system."""
+        """Release the link."""
         os.close(self._master)
         os.close(self._slave)
 
 
 class UdpEnd:
-    """A UDP port on loopback; datagrams go to whom the last one came from."""
+    """UDP port on loopback; datagrams are sent to the sender of the last one."""
 
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -78,42 +78,42 @@ class UdpEnd:
         self.address = f"udp://127.0.0.1:{self._socket.getsockname()[1]}"
 
     def fileno(self) -> int:
-        """Return what becomes readable when something comes."""
+        """Return the file descriptor, which is readable when data have come."""
         return self._socket.fileno()
 
     def received(self) -> list[Piece]:
-        """Return what has come."""
+        """Return the pieces received."""
         with suppress(OSError):  # nothing there, or the host's port is gone
             data, self._host = self._socket.recvfrom(LARGEST_DATAGRAM)
             return [data]
         return []
 
     def send(self, t_s: float, piece: Piece) -> None:
-        """Send to the host; what the system does not take at once is lost, as on a line that nobody reads."""
+        """Send to the host; data that the system does not take at once are lost, as on a line without a reader."""
         assert isinstance(piece, bytes)
         if self._host is not None:
             with suppress(OSError):
                 self._socket.sendto(piece, self._host)
 
     def close(self) -> None:
-        """Give the link back to the system."""
+        """Release the link."""
         self._socket.close()
 
 
 End = PseudoTerminal | UdpEnd
-"""A link of the system, as the emulated device holds it; it never waits."""
+"""A link of the system at the emulated device's end; it never waits."""
 
 
 class SlcanAdapter:
-    """A CAN device behind a serial adapter as python-can's ``slcan`` speaks to it: a line of text for each data frame.
+    """CAN device behind a serial adapter of python-can's interface ``slcan``: a line of text for each data frame.
 
-    Of the adapter's commands, ``O`` and ``L`` open it and ``C`` closes it; the others are taken, and none is answered
+    Of the adapter's commands, ``O`` and ``L`` open it and ``C`` closes it; the others are ignored, and none is answered
     [sourced: LAWICEL AB, CANUSB manual; python-can waits for no answer].
 
     Parameters
     ----------
     device
-        What hangs on the bus.
+        The device on the bus.
     """
 
     _FRAME = re.compile(rb"(?:t([0-9A-Fa-f]{3})|T([0-9A-Fa-f]{8}))[0-8]((?:[0-9A-Fa-f]{2}){0,8})")
@@ -125,7 +125,7 @@ class SlcanAdapter:
         self._open = False
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take bytes of the host; return what the host gets by `now_s`."""
+        """Take bytes from the host; return as :meth:`poll`."""
         assert isinstance(piece, bytes)
         sent = list(self._device.poll(now_s))
         *lines, rest = (self._line + piece).split(b"\r")
@@ -141,11 +141,11 @@ class SlcanAdapter:
         return self._texts(sent)
 
     def poll(self, now_s: float) -> Sequence[Sent]:
-        """Return what the device has put on the bus by `now_s`; nothing while the adapter is closed."""
+        """Return the frames on the bus by `now_s` as text; none while the adapter is closed."""
         return self._texts(self._device.poll(now_s))
 
     def next_s(self) -> float:
-        """Return when the device has something to do next."""
+        """Return the second of the device's next event."""
         return self._device.next_s()
 
     def _texts(self, sent: Sequence[Sent]) -> list[Sent]:
@@ -158,16 +158,16 @@ class SlcanAdapter:
 
 
 class RealTimeServer:
-    """Carries what passes between emulated devices and links of the system, by a clock.
+    """Server that carries pieces between emulated devices and links of the system, by a clock.
 
-    Every piece has the time at which it is due, so that waits that end late delay it and nothing behind it.
+    Every piece has the time at which it is due, so that a wait that ends late delays it and no later one.
 
     Parameters
     ----------
     served
-        By device: its line, and the link of the system that it is on, which is closed with the server.
+        By device: its line, and its link of the system, which is closed with the server.
     clock
-        Nanoseconds, from which the emulators' seconds are taken.
+        Clock [ns] of the emulators' seconds.
     """
 
     def __init__(self, served: Mapping[str, tuple[Line, End]], clock: Clock) -> None:
@@ -181,7 +181,7 @@ class RealTimeServer:
         self._thread = threading.Thread(target=self._run, name="emulated devices", daemon=True)
         self._stop = False
         self.error: BaseException | None = None
-        """What an emulator raised, which ended the service."""
+        """The error of an emulator, which ended the service."""
 
     def start(self) -> None:
         """Serve in a thread of its own, until :meth:`close`."""
@@ -197,10 +197,10 @@ class RealTimeServer:
         self._selector.close()
 
     def serve(self, at_s: float | None = None) -> float:
-        """Carry what has come and what is due at `at_s` or now; return when something is due next, or infinity."""
+        """Carry pieces received and due at `at_s`, or now; return the second of the next event, or infinity."""
         for name, (line, end) in list(self._open.items()):
             pieces = end.received()
-            now_s = self._clock() * 1e-9 if at_s is None else at_s  # after what it is the time of
+            now_s = self._clock() * 1e-9 if at_s is None else at_s  # not before the pieces were received
             for piece in pieces:
                 line.feed(piece, now_s)
             line.poll(now_s)
@@ -219,7 +219,7 @@ class RealTimeServer:
             while not self._stop:
                 wait_s = self.serve() - self._clock() * 1e-9
                 self._selector.select(min(max(0.0, wait_s), STOP_S))
-        except BaseException as error:  # shown to whoever waits for the device
+        except BaseException as error:  # raised by EmulatedDevices.advance
             self.error = error
             for name in list(self._open):
                 self._unplug(name)

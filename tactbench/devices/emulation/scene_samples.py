@@ -1,4 +1,4 @@
-"""What moves emulated devices: the samples of one scene that a simulated rig has carried out."""
+"""The samples of one simulated scene, as emulated devices sense them."""
 
 from __future__ import annotations
 
@@ -16,29 +16,35 @@ class SceneSamples:
     """A scene as :data:`~tactbench.devices.emulator.Senses`: every channel's latest sample at or before a time.
 
     All channels are held from one sample to the next in the same way, so that the sensor's and the force sensor's stay
-    as simultaneous as they were simulated. Before the scene begins and after it is over, nothing is pressed: the
-    samples of its first `rest_s` seconds, before pressing began, come again and again, offsets and noise included.
-    Until :meth:`start` was called, the scene has not begun.
+    as simultaneous as they were simulated. Before and after the scene nothing is pressed: the samples of its first
+    `rest_s` seconds, before pressing began, repeat, offsets and noise included. :meth:`start` begins the scene.
 
     Parameters
     ----------
     streams
-        The sensor's and the force sensor's.
+        Streams of the sensor and the force sensor.
     blocks
-        Theirs, with times in nanoseconds since the scene's beginning.
+        Their blocks, with times in nanoseconds since the begin of the scene.
     duration_s
-        Its length.
+        Length of the scene.
     rest_s
-        How long nothing is pressed at its beginning; 0: the first sample alone is held.
+        Length of its unloaded beginning; 0: the first sample alone is held.
     """
 
     def __init__(
         self, streams: Sequence[StreamSpec], blocks: Iterable[Block], duration_s: float, *, rest_s: float = 0.0
     ) -> None:
-        self.duration_s = duration_s
-        self._rest_ns = round(1e9 * min(rest_s, duration_s))
+        import numpy as np
+
+        self._end_ns, self._rest_ns = round(1e9 * duration_s), round(1e9 * min(rest_s, duration_s))
         self._start_s: float | None = None
-        self._tracks = _tracks(streams, blocks)
+        came, self._tracks = list(blocks), []
+        for stream in streams:
+            own = [block for block in came if block.stream == stream.name and block.t_ns is not None]
+            if own:
+                times: list[int] = np.concatenate([block.t_ns for block in own if block.t_ns is not None]).tolist()
+                names = tuple(channel.name for channel in stream.channels)
+                self._tracks.append((times, names, np.concatenate([block.data for block in own]).tolist()))
         self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
 
     def start(self, at_s: float) -> None:
@@ -48,35 +54,12 @@ class SceneSamples:
     def __call__(self, t_s: float) -> Mapping[str, float]:
         """Return the value of every channel at `t_s`, seconds of the devices' clock, in the channels' units."""
         since_ns = round(1e9 * (t_s - (self._start_s or 0.0)))
-        if self._start_s is None or not 0 <= since_ns < round(1e9 * self.duration_s):
+        if self._start_s is None or not 0 <= since_ns < self._end_ns:
             since_ns = since_ns % self._rest_ns if self._rest_ns else 0
         rows = tuple(max(bisect_right(times, since_ns) - 1, 0) for times, _, _ in self._tracks)
-        last_rows, values = self._last
-        if rows != last_rows:
+        if rows != self._last[0]:
             found: dict[str, float] = {}
             for row, (_, names, samples) in zip(rows, self._tracks, strict=True):
                 found.update(zip(names, samples[row], strict=True))
-            values = found
-            self._last = rows, values
-        return values
-
-
-def _tracks(
-    streams: Sequence[StreamSpec], blocks: Iterable[Block]
-) -> list[tuple[list[int], tuple[str, ...], list[list[float]]]]:
-    """Return times [ns], channels and rows of samples of each stream that has any."""
-    import numpy as np
-
-    found: dict[str, list[Block]] = {stream.name: [] for stream in streams}
-    for block in blocks:
-        if block.t_ns is not None:
-            found[block.stream].append(block)
-    return [
-        (
-            np.concatenate([block.t_ns for block in several if block.t_ns is not None]).tolist(),
-            tuple(channel.name for channel in stream.channels),
-            np.concatenate([block.data for block in several]).tolist(),
-        )
-        for stream in streams
-        if (several := found[stream.name])
-    ]
+            self._last = rows, found
+        return self._last[1]

@@ -1,4 +1,4 @@
-"""Virtual time: a clock that stands until somebody waits, and the host's end of links to emulated devices in it."""
+"""Virtual time: a clock that advances by waits alone, and the host's end of links to emulated devices."""
 
 from __future__ import annotations
 
@@ -16,16 +16,14 @@ from tactbench.links.link import Link, Received
 
 
 class VirtualTime:
-    """A clock, and the emulated devices that live by it: single-threaded, and the same each time.
-
-    It is a :data:`~tactbench.links.link.Clock`: called, it returns nanoseconds, from 0 on.
+    """Clock of emulated devices, a :data:`~tactbench.links.link.Clock` from 0 on: single-threaded and deterministic.
 
     Attributes
     ----------
     now_s
-        The same in seconds.
+        The time in seconds.
     lines
-        The devices; what several do at one moment happens in their order.
+        The devices; events of one moment happen in their order.
     """
 
     def __init__(self) -> None:
@@ -33,16 +31,16 @@ class VirtualTime:
         self.lines: list[Line] = []
 
     def __call__(self) -> int:
-        """Return the present time, nanoseconds."""
+        """Return the time in nanoseconds."""
         return round(self.now_s * 1e9)
 
     def advance(self, until_ns: int) -> None:
-        """Let all devices go on up to and including `until_ns`; a time that is over changes nothing."""
+        """Advance all devices up to and including `until_ns`; a time that is over changes nothing."""
         while self.step(until_ns * 1e-9):
             pass
 
     def step(self, until_s: float) -> bool:
-        """Go on to the next event of a device and carry it out; without one up to `until_s` go there.
+        """Advance to the next event of a device and carry it out, or to `until_s` if that is earlier.
 
         Returns
         -------
@@ -60,7 +58,7 @@ class VirtualTime:
 
 
 class _VirtualLink(Link):
-    """The host's end of a line: what is written is with the device at once, waits let time go on."""
+    """The host's end of a line: a piece reaches the device at once, and waits advance the time."""
 
     def __init__(self, name: str, time: VirtualTime, line: Line) -> None:
         super().__init__(f"emulated {name}", time)

@@ -1,8 +1,7 @@
 """The bench as a rig: a sensor and a reference force sensor are read while a person presses, and nothing moves.
 
-Devices that the rig file calls emulated are moved by a simulated rig with the same scene; their readings then come
-through their links and drivers as from real ones. Those of real time run in a process of their own, and are real ones
-here.
+Devices that the rig file calls emulated sense what a simulated rig computes of the same scene, in virtual time; their
+links and drivers carry it as those of real ones do. What `tactbench emulate` runs in real time is a real device here.
 """
 
 from __future__ import annotations
@@ -40,7 +39,6 @@ from tactbench.plugin.devices import (
     ask_operator,
     drivers_of,
     physics_of,
-    running,
     with_sensor,
 )
 
@@ -98,7 +96,7 @@ class Bench(Rig):
 
     def __init__(self, file: RigFile, operator: Operator | None) -> None:
         self._registry = load_registry()
-        self._file = running(file)
+        self._file = file
         self._operator = operator
         self._physics = physics_of(self._file, self._registry)
 

@@ -43,7 +43,6 @@ from tactbench.plugin.devices import (
     ask_operator,
     physics_of,
     read_options,
-    running,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
@@ -147,7 +146,7 @@ class PressAcquisition:
     @property
     def counts(self) -> Mapping[str, int]:
         """The counts of drivers and guard."""
-        guard = {f"{name}: {what}": n for name, counts in self.control.counts().items() for what, n in counts.items()}
+        guard = {f"{name}: {what}": n for name, counts in self.control.counts.items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property
@@ -168,8 +167,8 @@ class ParallelManipulator(Rig):
     Parameters
     ----------
     file
-        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those of real time run
-        in a process of their own, and are real ones here.
+        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those that `tactbench
+        emulate` runs in real time are real ones here.
     operator
         The person who mounts the caps; not needed where all devices are emulated.
     physics
@@ -376,7 +375,7 @@ def build(context: RigContext) -> ParallelManipulator:
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
             hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
         )
-    file = running(context.rig_file)
+    file = context.rig_file
     if problems := check(file).problems:
         raise UsageError(
             f"The rig file is refused: {problems[0]}",

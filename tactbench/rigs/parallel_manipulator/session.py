@@ -148,7 +148,9 @@ class Session:
         """Return the force samples that are received in the next seconds, without earlier ones."""
         since_ns = self.clock()
         self.guard.advance(since_ns + round(1e9 * seconds))
-        return [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks() if block.t_ns is not None]
+        found = [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks if block.t_ns is not None]
+        self.guard.force_blocks.clear()
+        return found
 
     def travel(
         self, xy_m: tuple[float, float], ask: Callable[[str, str], bool] = lambda doing, text: False

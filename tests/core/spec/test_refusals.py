@@ -148,8 +148,6 @@ def test_a_rig_file_is_for_one_rig_and_one_clock():
     real = {"force": {"link": "can0", "device": "ati"}, "devices": {"motor": {"link": "can1", "device": "faulhaber"}}}
     assert list(rig(**real).entries()) == ["icub", "force", "motor"]
     assert rig().checked_for("bench") == rig().checked_for_one_clock() == rig()
-    clocked = rig(**real, emulation={"time": "real"})
-    assert clocked.checked_for_one_clock() is clocked
     all_real = rig(sensors={"icub": {"link": "can2"}}, **real)
     assert (rig(**real).emulated, all_real.emulated) == (True, False)
     assert all_real.checked_for_one_clock() is all_real

@@ -20,7 +20,7 @@ MOTOR = {
 
 def steps(*answers, faults=()):
     """Type answers; return what was asked and said, the largest force on the skin [N], and the motor at the end."""
-    registry, heard, over, emulators = load_registry(), [], [], []
+    registry, heard, emulators = load_registry(), [], []
     pressed = [0.0]
 
     def senses(t_s):
@@ -31,9 +31,7 @@ def steps(*answers, faults=()):
 
     def ask(text):
         heard.append(text)
-        until_ns = devices.clock() + 100_000_000
-        while devices.clock() < until_ns and not over:  # somebody thinks
-            pass
+        devices.advance(devices.clock() + 100_000_000)  # somebody thinks
         return next(given)
 
     motor, box = registry.devices["faulhaber"], registry.devices["net-ft"]
@@ -50,10 +48,7 @@ def steps(*answers, faults=()):
             DriverSettings(devices.opener("force"), options=box.emulated_options, clock=devices.clock)
         ) as force,
     ):
-        try:
-            move_by_steps("motor", axis, force, ENTRY, CEILING_N, ask, heard.append)
-        finally:
-            over.append(True)
+        move_by_steps("motor", axis, force, ENTRY, CEILING_N, ask, heard.append)
     return heard, max(pressed), emulators[0]
 
 

@@ -13,8 +13,7 @@ from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter
-from tactbench.plugin import ChannelSpec, StreamSpec
-from tactbench.plugin.devices import EmulatorSettings, RowEmulator, open_link
+from tactbench.plugin.devices import open_link
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 from tests.devices.emulation.test_virtual_time import on, say
 
@@ -38,23 +37,6 @@ def test_what_is_due_is_sent_and_nothing_before():
             assert data + (b"" if len(data) == 6 else link.read(1.0).data) == bytes([1, 0, 0, 2, 0, 0])
     finally:
         server.close()
-
-
-@pytest.mark.parametrize(("rate_hz", "baud"), [(100.0, 115200), (1000.0, 921_600)])
-def test_the_address_states_a_baud_rate_that_carries_what_is_sent(rate_hz, baud):
-    """64 bytes a row at 1 kHz were written down with 115200 baud, 11.5 kB/s."""
-    row = StreamSpec(name="row", channels=tuple(ChannelSpec(name=f"c{n}", kind="taxel") for n in range(64)))
-
-    class Sends(RowEmulator):
-        stream = row
-
-        def sent(self, values):
-            return [bytes(len(values))]
-
-    model = Sends(EmulatorSettings(lambda t_s: {}, None))
-    model.rate_hz = rate_hz
-    with EmulatedDevices({"a": on("bytes", model)}, time="real") as devices:
-        assert devices.addresses["a"].endswith(f"?baud={baud}")
 
 
 @needs_pty
@@ -81,26 +63,10 @@ def test_an_unplugged_terminal_is_gone():
             assert server.serve(1.5) == math.inf
             with pytest.raises(LinkUnplugged):
                 link.read(1.0)
-        with pytest.raises(LinkError, match="cannot be opened"):
+        with pytest.raises(LinkError):
             open_link(end.address)
     finally:
         server.close()
-
-
-def test_virtual_and_real_time_give_the_same_device_data():
-    """A device that samples by itself senses the same at its own times, whatever the host does."""
-
-    def recorded(time):
-        device = on("datagram", Recorder(0.01, lambda t_s: {"a": 1000 * t_s}))
-        with EmulatedDevices({"a": device}, time=time) as devices, devices.open_link("a") as link:
-            link.send(b"I am here")
-            return [link.receive(5.0).data for _ in range(30)]
-
-    # In real time the first may have been sent before the device knew to whom.
-    virtual, real = recorded("virtual"), recorded("real")
-    first = virtual.index(real[0])
-    assert first < 5
-    assert real[: 30 - first] == virtual[first:]
 
 
 @pytest.mark.parametrize(

@@ -58,8 +58,8 @@ class Rig:
     def begin_anew(self):
         """Disarm, and forget what was: for the next test with the same guard."""
         self.guard.disarm()
-        for taken in (self.guard.force_blocks, self.guard.motor_blocks, self.guard.events):
-            taken()
+        for items in (self.guard.force_blocks, self.guard.motor_blocks, self.guard.events):
+            items.clear()
         self.world.force.faults.clear()
         self.world.sensed = lambda wrench, at_s: wrench
         self.world.largest_n = 0.0

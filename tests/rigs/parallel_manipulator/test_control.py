@@ -42,7 +42,7 @@ def test_while_it_runs_counts_are_those_of_its_own_thread():
     control.start()
     seen, waits = {}, threading.Event()
     for _ in range(1000):
-        seen = control.counts()
+        seen = control.counts
         if seen.get("guard", {}).get("beats", 0) > 20:
             break
         waits.wait(0.01)
@@ -50,7 +50,7 @@ def test_while_it_runs_counts_are_those_of_its_own_thread():
     assert asked.threads == {"force control"}
     control.stop()
     # Of the end, not of a quarter of a second before.
-    assert control.counts()["guard"]["beats"] == guard.counts()["guard"]["beats"]
+    assert control.counts["guard"]["beats"] == guard.counts["guard"]["beats"]
     guard.close()
 
 

@@ -41,8 +41,8 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert press.reports[-1].state is GuardState.ARMED
         assert made.world.largest_n == pytest.approx(made.setting.setpoint_n, abs=0.3)
         armed_ns = press.reports[0].t_ns
-        blocks = [block for block in made.guard.force_blocks() if block.t_ns[0] >= armed_ns]
-        moved = made.guard.motor_blocks()
+        blocks = [block for block in made.guard.force_blocks if block.t_ns[0] >= armed_ns]
+        moved = made.guard.motor_blocks
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
         # Raw and whole: every sample since it was armed, in order, as the sensor gave them.
@@ -52,8 +52,8 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
             made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
         )
-        assert [event.text for event in made.guard.events()] == ["started", "homing motor", "armed"]
-        assert made.guard.counts()["guard"]["beats"] == press.sequence
+        assert [event.text for event in made.guard.events] == ["started", "homing motor", "armed"]
+        assert made.guard.counts["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
         assert made.out
 
@@ -151,7 +151,7 @@ class TestInAProcess:
         # 100 samples, which a full socket holds back.
         threading.Event().wait(0.4 * limits.heartbeat_s)
         assert guard.beat(Beat(in_process.clock())).accepted
-        assert len(np.concatenate([block.data for block in guard.force_blocks()])) > 50
+        assert len(np.concatenate([block.data for block in guard.force_blocks])) > 50
 
 
 # In virtual time ------------------------------------------------------------------------------------------------------
@@ -168,7 +168,8 @@ def test_a_force_that_is_wrong(name, trigger, made):
 def test_what_came_before_it_was_armed_is_not_handed_over_afterwards(made):
     made.guard.advance(made.clock() + 10**9)
     made.guard.arm(made.setting.limits)
-    assert made.guard.force_blocks() == made.guard.motor_blocks() == []
+    assert not made.guard.force_blocks
+    assert not made.guard.motor_blocks
 
 
 def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(tmp_path):
@@ -252,7 +253,7 @@ def test_what_goes_wrong_in_devices_leads_to_a_fault(where, text, trigger, tmp_p
         report = made.ended(20.0)
         assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
         assert made.out is not (text.startswith(("motor-fault", "unplug")) and where.startswith("motor"))
-        events = made.guard.events()
+        events = made.guard.events
         (first,) = [event for event in events if event.trigger is trigger][:1]
         assert 1.5 <= 1e-9 * first.t_ns < 4.0
         assert math.isfinite(first.force_n)
@@ -304,7 +305,7 @@ def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
     made.press(held(made))
     report = made.ended(5.0)
     assert report.state is GuardState.FAULT
-    (event,) = [event for event in made.guard.events() if event.trigger is Trigger.RETREAT_FAILED]
+    (event,) = [event for event in made.guard.events if event.trigger is Trigger.RETREAT_FAILED]
     assert report.not_out == event.text
     assert not made.world.motor.drive.enabled
 
@@ -357,7 +358,7 @@ def test_out_is_place_and_force(made):
     report = made.guard.disarm()
     assert made.out
     assert re.search(r" 3\.\d\d N", report.not_out)
-    (event,) = [event for event in made.guard.events() if event.trigger is Trigger.NOT_CLEAR]
+    (event,) = [event for event in made.guard.events if event.trigger is Trigger.NOT_CLEAR]
     assert event.text == report.not_out
     made.world.sensed = lambda wrench, at_s: wrench
     with pytest.raises(GuardRefusesError, match=re.escape(report.not_out)):

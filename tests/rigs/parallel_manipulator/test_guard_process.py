@@ -75,7 +75,7 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         for _ in range(2):
             with pytest.raises(GuardLostError):
                 made.guard.advance(made.clock() + 10**9)
-        (event,) = [event for event in made.guard.events() if event.trigger]
+        (event,) = [event for event in made.guard.events if event.trigger]
         assert event.trigger == "guard is gone"
         assert made.out
 
@@ -111,7 +111,7 @@ def test_an_error_of_a_driver_lets_the_motor_retreat(tmp_path, monkeypatch):
         report = made.ended()
         assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_LOST)
         assert made.out
-        (event,) = [event for event in made.guard.events() if event.trigger is Trigger.FORCE_LOST]
+        (event,) = [event for event in made.guard.events if event.trigger is Trigger.FORCE_LOST]
         assert event.text.startswith("ZeroDivisionError: ")
 
 

@@ -14,6 +14,7 @@ from tactbench.plugin import RigContext, load_registry
 from tactbench.plugin.devices import RigFile
 from tactbench.rigs.parallel_manipulator.rig import build
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
+from tests.devices.emulating import emulating
 from tests.rigs.parallel_manipulator.spring import EXAMPLE, ramp
 
 REGISTRY = load_registry()
@@ -23,7 +24,7 @@ def impatient(tmp_path):
     """Return the example in real time, its moves quick, and late by whatever other work of this machine makes it."""
     said = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
     settings = said["settings"]
-    said["emulation"]["time"], said["allowed"] = "real", {"lost_percent": 100.0}
+    said["allowed"] = {"lost_percent": 100.0}
     said["force"] |= {"zero_s": 0.3, "range_n": 200.0}  # a short zero of the twin's noise drifts
     settings["limits"] |= {"force_age_ms": 1000.0, "heartbeat_ms": 2000.0, "rated_force_n": 2000.0}
     settings["force_loop"]["speed_mm_s"] = 2.0
@@ -38,12 +39,17 @@ def impatient(tmp_path):
 
 def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_home(tmp_path):
     """The sender of the force was a thread of the rig's process, which held it up for longer than the guard allows."""
-    file, icub, scene = impatient(tmp_path), REGISTRY.sensors["icub"], ramp(2.5, 0.2, 2.0)
-    rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=file))
-    for name in ("a.h5", "b.h5"):
-        described = REGISTRY.rigs["parallel-manipulator"]
-        request = RecordingRequest(icub, described, scene, tmp_path / name, seed=7, rig_file=file)
-        acquire(rig, request, clock=time.perf_counter)
+    icub, described, scene = REGISTRY.sensors["icub"], REGISTRY.rigs["parallel-manipulator"], ramp(2.5, 0.2, 2.0)
+    with emulating(impatient(tmp_path), tmp_path) as file:
+        rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=file))
+        for name in ("a.h5", "b.h5"):
+            request = RecordingRequest(icub, described, scene, tmp_path / name, seed=7, rig_file=file)
+            acquire(rig, request, clock=time.perf_counter)
+        guard = rig._session.guard
+        assert guard._process.poll() is None
+        del rig
+        gc.collect()
+        assert guard._process.poll() == 0
     with open_recording(tmp_path / "b.h5") as recording:
         recording.verify()
         meta, force, taxels = recording.meta, recording.read("force_torque"), recording.read("taxels")
@@ -54,10 +60,5 @@ def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_ho
     at_s = 1e-9 * (force.t_ns - force.t_ns[0])
     assert force.data[at_s > 1.7, 2].mean() > force.data[at_s < 0.2, 2].mean() + 0.7
     assert abs(taxels.data[-10:].mean(axis=0) - taxels.data[:10].mean(axis=0)).max() > 5
-    guard = rig._session.guard
-    assert guard._process.poll() is None
-    del rig
-    gc.collect()
-    assert guard._process.poll() == 0
     said = (tmp_path / "guard.log").read_text(encoding="utf-8")
     assert (said.count('"homing motor"'), said.count('"armed"}')) == (1, 4)

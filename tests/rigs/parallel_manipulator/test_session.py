@@ -74,7 +74,7 @@ def test_the_platform_is_where_it_believes_to_be_scene_after_scene_and_an_operat
         assert place == pytest.approx((*xy_m, -0.15), abs=20e-6)
         # Three rails, each within its corridor of 10 um.
         assert np.linalg.norm(true_place_m(session) - place) < 20e-6
-    assert sum(event.text.startswith("homing") for event in session.guard.events()) == 4
+    assert sum(event.text.startswith("homing") for event in session.guard.events) == 4
     clear, push, _ = asked
     assert "joint-3" in clear
     assert "306 g" in push

@@ -71,7 +71,7 @@ def test_it_is_homed_and_goes_where_it_is_sent(stage):
 
 def test_homing_is_ended_by_a_stop_and_has_a_deadline(stage):
     stage.start()
-    with pytest.raises(PositionerError, match="told to stand"):
+    with pytest.raises(PositionerError, match="halted"):
         stage.home(lambda: True)
     assert not stage.homed
     stage.emulator.deaf_to = b"H"

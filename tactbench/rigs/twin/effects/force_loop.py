@@ -42,7 +42,7 @@ def apply(run: Synthesis) -> None:
     table = bare_skin(run, BEYOND * run.load.largest_n)
     force_n, deepest = force_at_depth(table)
     start = float(table.skin(setpoint[:1]).depth_mm[0])
-    model = LoopModel.of(drive, "mm", period_s=step_s, travel=(-RETRACT_MM, deepest))
+    model = LoopModel.of(drive, step_s, travel=(-RETRACT_MM, deepest))
     depths = model.simulate(force_n, setpoint, noise, start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
     run.follow(Load(t_s, forces))

@@ -61,7 +61,7 @@ def test_without_the_filter_the_loop_oscillates_and_with_it_it_settles(pressed):
 
 def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed):
     run = pressed(_scene(_unfiltered()), "force-loop")
-    limit = LoopModel.of(_unfiltered(), "mm", period_s=0.012).largest_stiffness()
+    limit = LoopModel.of(_unfiltered(), 0.012).largest_stiffness()
     table = bare_skin(run, BEYOND * 5.0)
     loads = np.linspace(0.0, 5.0, 501)
     stiffness = np.gradient(loads, table.skin(loads).depth_mm)
