@@ -1,11 +1,11 @@
-"""The states of a press on a simulated spring, also when its loop swings or the guard retreats."""
+"""The states of a press on a simulated spring, also when its loop swings."""
 
 import math
 import re
 
 import pytest
 
-from tactbench.devices.guard_messages import Report, Trigger
+from tactbench.devices.guard_messages import Report
 from tactbench.devices.press import PressState
 from tactbench.plugin import ChannelSpec, StreamSpec
 from tactbench.plugin.devices import CommandKind, Course, GuardState, Press
@@ -29,7 +29,7 @@ class Plant:
         self.skin_m = settings.surface_m
         self.now_s, self.position_m = 0.0, 1e-3 * settings.limits.retreat_mm
         self.target_m, self.speed_m_s = self.position_m, 0.0
-        self.state, self.trigger, self.touched, self.accepted = GuardState.ARMED, None, False, True
+        self.state, self.touched = GuardState.ARMED, False
         self.seen, self.largest_n, self.steps = [], 0.0, []
 
     @property
@@ -39,9 +39,8 @@ class Plant:
     def report(self):
         moving = self.position_m != self.target_m
         return Report(
-            round(1e9 * self.now_s), self.state, "" if self.accepted else "refused", moving=moving,
-            position_m=self.position_m, target_m=self.target_m, force_n=self.force_n, touched=self.touched,
-            trigger=self.trigger,
+            round(1e9 * self.now_s), self.state, moving=moving, position_m=self.position_m, target_m=self.target_m,
+            force_n=self.force_n, touched=self.touched,
         )  # fmt: skip
 
     def go(self):
@@ -105,18 +104,3 @@ def test_a_loop_that_swings_ends_the_press():
     plant = Plant(settings).begun().until(PressState.FAILED)
     # Which comes first depends on where the swing has found the surface.
     assert re.search("off by|softest", plant.press.ended)
-
-
-@pytest.mark.parametrize("state", [PressState.APPROACH, PressState.CONTACT, PressState.RAMP])
-def test_a_guard_that_retreats_ends_the_press(state):
-    plant = Plant()
-    if state is PressState.RAMP:
-        plant.begun()
-    plant.until(state)
-    plant.state, plant.trigger = GuardState.RETREATING, Trigger.FORCE_CEILING
-    plant.go()
-    assert plant.press.state is PressState.RETREAT
-    plant.state = GuardState.FAULT
-    plant.go()
-    assert plant.press.state is PressState.FAILED
-    assert plant.press.ended == f"in {state}: force ceiling"
