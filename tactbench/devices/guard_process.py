@@ -33,6 +33,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, NoReturn, TypeAlias
 
 from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchError, UsageError
@@ -157,7 +158,7 @@ class GuardProcess:
             raise UsageError("The guard's process needs sessions and signals of POSIX.", hint="Use Linux.")
         self._settings, self._clock = settings, settings.clock()
         self._limits: Limits | None = None
-        self._requested = ""
+        self._requested, self._number = "", 0
         self._closed = False
         self._lost: GuardLostError | None = None
         self.force_blocks: list[Block] = []
@@ -199,9 +200,8 @@ class GuardProcess:
 
     def advance(self, until_ns: int) -> None:
         """Wait until the clock is at a nanosecond, and receive the samples and events since the last request."""
-        # Without a request out, the connection is readable only at its end.
-        if self._lost is None and self._connection.poll(max(0.0, 1e-9 * (until_ns - self._clock()))):
-            self._fail("its connection has ended")
+        if self._lost is None:
+            self._connection.poll(max(0.0, 1e-9 * (until_ns - self._clock())))  # its end ends the wait
         self._request("collect", self._timeout_s)
 
     def disarm(self) -> Report:
@@ -216,7 +216,7 @@ class GuardProcess:
             return
         self._closed = True
         with suppress(OSError):
-            self._connection.send(("close", None))
+            self._connection.send((0, "close", None))
         try:
             self._process.wait(ARM_S)
         except subprocess.TimeoutExpired:
@@ -233,17 +233,19 @@ class GuardProcess:
         """Send a request and return its result; raises the error that the process answers, or GuardLostError."""
         if self._lost is not None:
             raise self._lost
-        self._requested = what
+        self._requested, self._number, number = what, self._number + 1, 0
+        until_ns = self._clock() + round(1e9 * timeout_s)
         try:
-            self._connection.send((what, given))
-            if not self._connection.poll(timeout_s):
-                self._fail(f"it has not answered within {timeout_s:.3f} s")
-            result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
-        except (EOFError, OSError):
+            self._connection.send((self._number, what, given))
+            while number != self._number:  # an answer to an interrupted request comes before
+                if not self._connection.poll(max(0.0, 1e-9 * (until_ns - self._clock()))):
+                    self._fail(f"it has not answered within {timeout_s:.3f} s")
+                number, result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
+                self.force_blocks += force_blocks
+                self.motor_blocks += motor_blocks
+                self.events += events
+        except (EOFError, OSError, UnpicklingError):
             self._fail("its connection has ended")
-        self.force_blocks += force_blocks
-        self.motor_blocks += motor_blocks
-        self.events += events
         if isinstance(result, TactbenchError):
             raise result
         return result
@@ -308,10 +310,10 @@ class _Server:
     def _serve(self, timeout_s: float) -> None:
         try:
             while not self._rig_gone and not self._closing and self._connection.poll(timeout_s):
-                what, given = self._connection.recv()
+                number, what, given = self._connection.recv()
                 self._closing = what == "close"
                 if not self._closing:
-                    self._connection.send(self._answer(what, given))
+                    self._connection.send((number, *self._answer(what, given)))
                 timeout_s = 0.0
         except (EOFError, OSError):  # a rig that takes no answer counts as gone
             self._rig_gone = True

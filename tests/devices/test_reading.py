@@ -268,7 +268,7 @@ def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
     assert reading.stream_counts["wide"].written > 10
 
 
-# The queue of a stream -------------------------------------------------------------------------------------------------
+# The queue of a stream ------------------------------------------------------------------------------------------------
 
 NARROW = stream_of("s", 100.0, 2)
 
