@@ -43,7 +43,6 @@ from tactbench.plugin.devices import (
 )
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock
 
 
@@ -59,13 +58,11 @@ class BenchAcquisition:
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
-    zero: Mapping[str, FloatArray]
-    """By stream of the force sensor: (channels,) what it read without load, taken off."""
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
         for block in self.reading.blocks(self.duration_s):
-            yield block if self.force is None else self.force.turned(block, self.zero)
+            yield block if self.force is None else self.force.turned(block)
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -130,8 +127,9 @@ class Bench(Rig):
                 stack.callback(driver.close)
             identity = {name: driver.identify() for name, driver in drivers.items()}
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
-            zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
-            self._prompt(force, zero, file, sensor, scene)
+            if force is not None:
+                self._take_zero(force, file, drivers[FORCE], clock)
+            self._prompt(force, file, sensor, scene)
             advance = None if emulated is None else emulated.advance
             reading = stack.enter_context(
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
@@ -148,15 +146,14 @@ class Bench(Rig):
                 drawn={
                     **(simulated.drawn if simulated is not None else {}),
                     **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                    **({} if force is None else force.about(zero)),
+                    **({} if force is None else force.about()),
                 },
                 reading=reading,
                 duration_s=scene.profile.duration.to("s"),
                 force=force,
-                zero=zero,
             )
 
-    def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
+    def _take_zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> None:
         assert file.force is not None
         seconds = file.force.zero_s
         blocks: list[Block] = []
@@ -168,18 +165,17 @@ class Bench(Rig):
             while clock() < until_ns:
                 blocks += driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9)))
             driver.stop()
-        return force.zero(blocks)
+        force.take_zero(blocks)
 
     def _prompt(
         self,
         force: PressingForce | None,
-        zero: Mapping[str, FloatArray],
         file: RigFile,
         sensor: SensorDescriptor,
         scene: Scene,
     ) -> None:
         profile = scene.profile
-        taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
+        taken = "" if force is None else f"Zero of the force: {force.zero[force.column]:.3g} N. "
         text = (
             f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
             f"{profile.hold_s:.0f} s, then press slowly to {profile.largest_n:g} N and back, within "

@@ -35,7 +35,7 @@ from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, settin
 from tactbench.rigs.parallel_manipulator.workspace import Place, way, way_points
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Block, FloatArray
+    from tactbench.plugin import Block
     from tactbench.plugin.devices import Clock, Link
 
 CHECK_S = 1.0
@@ -112,15 +112,15 @@ class Session:
 
     # A scene's beginning ----------------------------------------------------------------------------------------------
 
-    def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
-        """Take the force sensor's zero, nothing being armed; return it, and what the guard is to keep.
+    def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, Limits]:
+        """Take the force sensor's zero, nothing being armed; return it, and the limits of the guard.
 
         `confirmed`: whether an operator has seen that the indenter is clear of the sensor.
         """
         assert self._file.force is not None
         settings, stream = self.settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
-        zero = force.zero(self._fresh(self._file.force.zero_s))[stream.name]
+        force.take_zero(self._fresh(self._file.force.zero_s))
         limits, touch = settings.limits, settings.touch
         kept = Limits(
             force_ceiling_n=limits.force_ceiling_n,
@@ -137,9 +137,9 @@ class Session:
             force_age_s=1e-3 * limits.force_age_ms,
             channel=force.column,
             sign=force.sign,
-            zero=tuple(zero.tolist()),
+            zero=tuple(force.zero.tolist()),
         )
-        return force, {stream.name: zero}, kept
+        return force, kept
 
     def _fresh(self, seconds: float) -> list[Block]:
         """Return the force samples that are received in the next seconds, and none from before."""
@@ -178,7 +178,7 @@ class Session:
                 f"The indenter is not known to be clear of the sensor: {unclear}. Bring it to its place of retreat by "
                 "hand or by the controller's own means, see that it touches nothing, and say so.",
             )
-        _, _, limits = self.measured_limits(confirmed=bool(unclear))
+        _, limits = self.measured_limits(confirmed=bool(unclear))
         self.checked = self.checked or self._check_force(limits, ask)
         report = guard.arm(limits)
         if not isinstance(delta, LinearDelta):

