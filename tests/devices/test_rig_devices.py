@@ -125,8 +125,8 @@ def zeroed(fz, tz=0.0, quality=None, **entry):
     t_s = np.arange(2000) / 1000
     data = np.column_stack([fz(t_s), np.broadcast_to(tz, t_s.shape)])
     force = PressingForce(ForceEntry(device="scale", link="emulated", **entry), (SCALE,))
-    zero = force.zero([Block("wrench", np.round(1e9 * t_s).astype(np.int64), data, quality)])
-    return zero["wrench"], force.about(zero)
+    force.take_zero([Block("wrench", np.round(1e9 * t_s).astype(np.int64), data, quality)])
+    return force.zero, force.about()
 
 
 def noise(sd):

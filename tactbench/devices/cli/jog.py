@@ -82,10 +82,11 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     while clock() < until_ns:
         blocks += force.read(LOOK_S)
         axis.update(0.0)
+    pressing.take_zero(blocks)
     limits = Limits(
         force_ceiling_n=ceiling_n, travel_ceiling_n=ceiling_n, touch_n=ceiling_n / 2, travel_m=axis.facts.limits,
         step_m=LONGEST_M, speed_m_s=SPEED_M_S, heartbeat_s=OLD_S, force_age_s=OLD_S, channel=pressing.column,
-        sign=pressing.sign, zero=tuple(pressing.zero(blocks)[stream.name].tolist()),
+        sign=pressing.sign, zero=tuple(pressing.zero.tolist()),
         same_samples=10**9 if entry.emulated else Limits.same_samples,  # an emulated sensor at rest has no noise
     )  # fmt: skip
 

@@ -516,11 +516,10 @@ def driver_reports_what_happens(subject: Subject) -> None:
 
 @check("device", needs="driver-reads")
 def device_is_fit_for_a_rig(subject: Subject) -> None:
-    """A rig takes forces for newtons and places for metres, a zero for taken if the driver says so, a motor for still.
+    """A rig takes forces for newtons and places for metres, what is not marked for a reading, and a motor for still.
 
-    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert. Return True from tare()
-    only where the device takes its reading as zero; mark its range's end as SATURATED. Leave a motor where it is, and
-    without power, in the driver's making, identify(), start() and read().
+    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert. Mark the end of a range
+    as SATURATED. Leave a motor where it is, and without power, in the driver's making, identify(), start() and read().
     """
     device, sensed = subject.descriptor.kind, dict[str, float]()
     kind, unit = ("force", "N") if device == "force" else ("position", "m")
@@ -534,25 +533,16 @@ def device_is_fit_for_a_rig(subject: Subject) -> None:
         if not own:
             fail("driver.streams", f"none of its channels is of kind {kind}")
 
-        def read(force_n: float) -> list[tuple[str, Any, Any]]:
-            """Return readings and marks of each of its own channels under a load."""
-            sensed.update({one.name: force_n for one in own if kind == "force"})
-            opened.read()
-            return [(f"driver.read: {name}.{one.name}", good(stream)[:, column], marks_of(stream)[:, column])
-                    for name, stream in opened.read().items()
-                    for column, one in enumerate(stream.spec.channels) if one in own]  # fmt: skip
-
-        for where, values, _ in read(LOAD_N):
-            there = values[np.isfinite(values)]  # none before an axis is homed
-            moved_m = float(np.ptp(there)) if len(there) else 0.0
-            if kind == "position" and moved_m > STILL_M:
-                fail(where, f"it changes by {1e3 * moved_m:.3g} mm, and nobody has moved it")
-        if kind == "position":
-            return
-        taken = opened.call("tare")
-        for _, values, _ in read(LOAD_N) if taken else ():
-            if abs(left_n := np.nanmedian(values)) > 2 * READ_N:
-                fail("driver.tare", f"it says that a zero is taken, and {left_n:.4g} N are read")
-        for where, _, marks in read(OVERLOAD_N):
-            if not (marks & (Quality.SATURATED | BAD)).all():
-                fail(where, f"it is not marked SATURATED under {OVERLOAD_N:g} N")
+        sensed.update({one.name: OVERLOAD_N for one in own if kind == "force"})
+        opened.read()
+        for name, stream in opened.read().items():
+            for column, one in enumerate(stream.spec.channels):
+                if one not in own:
+                    continue
+                where, marks = f"driver.read: {name}.{one.name}", marks_of(stream)[:, column]
+                there = good(stream)[:, column]
+                there = there[np.isfinite(there)]  # none before an axis is homed
+                if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
+                    fail(where, f"it changes by {1e3 * moved_m:.3g} mm, and nobody has moved it")
+                if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
+                    fail(where, f"it is not marked SATURATED under {OVERLOAD_N:g} N")

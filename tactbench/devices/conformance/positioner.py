@@ -77,7 +77,7 @@ def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
     with emulated(subject, of_both=given) as (opened, devices):
-        emulator: Any = devices.emulator_of(subject.name)
+        emulator = opened.emulator
         if not hasattr(emulator, "position_m"):
             fail("emulator", "it has no `position_m`: where the axis is, as its driver counts [m]")
         driver: Any = opened.driver

@@ -414,15 +414,11 @@ def test_random_faults_end_as_they_must():
 @pytest.mark.parametrize(
     "change",
     [
-        {"force_ceiling_n": 0.0},
-        {"force_ceiling_n": math.inf},
-        {"touch_n": 7.0},
-        {"travel_m": (1e-3, 1e-3)},
-        {"travel_ceiling_n": 7.0},
-        {"channel": 6},
-        {"sign": 0},
+        {"force_ceiling_n": 0.0}, {"force_ceiling_n": math.inf}, {"torque_ceiling_nm": 0.0}, {"touch_n": 7.0},
+        {"travel_m": (1e-3, 1e-3)}, {"travel_ceiling_n": 7.0}, {"channel": 6}, {"sign": 0},
     ],
-)
+    ids=str,
+)  # fmt: skip
 def test_limits_that_contradict_each_other(change):
     with pytest.raises(UsageError):
         replace(FAULTS.Setting().limits, **change)
