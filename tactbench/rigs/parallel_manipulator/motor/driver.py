@@ -106,7 +106,7 @@ class FaulhaberDriver(Positioner):
     @property
     def counts(self) -> Mapping[str, int]:
         """The counts of :class:`Exchange` that are not 0."""
-        return {name: count for name, count in self._exchange.counts.items() if count}
+        return +self._exchange.counts
 
     def identify(self) -> Mapping[str, str]:
         """Return firmware, and model and serial number where the drive has them."""
@@ -123,7 +123,7 @@ class FaulhaberDriver(Positioner):
         # No source states the answer to ANSW itself.
         self._exchange.send("ANSW", 2)
         self._exchange.quiet()
-        if not self._configuration() & Configuration.ACKNOWLEDGES:
+        if not self._has(Configuration.ACKNOWLEDGES):
             raise PositionerError("The motor's drive does not acknowledge commands after ANSW2.")
         self._ask("SOR", 0)
         self._settings, _ = _required(self.options)
@@ -133,7 +133,7 @@ class FaulhaberDriver(Positioner):
         for setting in self._settings:
             self._keep(*setting)
         self._usual = self._speed = self._sure("GSP")
-        self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
+        self.enabled = self._has(Configuration.POWER_STAGE)
         if self.enabled:
             self.locate()
         self._watching = True
@@ -148,7 +148,7 @@ class FaulhaberDriver(Positioner):
     def enable(self) -> None:
         """Give the motor power; it holds its place. One whose target is elsewhere is without power again."""
         self._ask("EN")
-        self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
+        self.enabled = self._has(Configuration.POWER_STAGE)
         if not self.enabled:
             raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its supply.")
         place_m, target_m = self.locate()
@@ -176,10 +176,11 @@ class FaulhaberDriver(Positioner):
 
         A drive that was without supply has neither (assumed: its power stage is off until EN).
         """
-        kept = Configuration.POWER_STAGE | Configuration.POSITION_LIMITS
-        if not self._limits or self._configuration() & kept != kept:
-            return False
-        self.homed = all(self._sure(query) == argument for _, argument, query in self._limits)
+        self.homed = (
+            bool(self._limits)
+            and self._has(Configuration.POWER_STAGE | Configuration.POSITION_LIMITS)
+            and all(self._sure(query) == argument for _, argument, query in self._limits)
+        )
         if self.homed:
             self.locate()
         return self.homed
@@ -190,8 +191,11 @@ class FaulhaberDriver(Positioner):
         The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive has its
         usual limits of current again once the place is found.
         """
-        if self.moving:
-            raise NotReadyError("The motor is moving.", hint="Wait for the end of its move, or let it retreat.")
+        if self.moving or not self._limits:
+            raise NotReadyError(
+                f"The motor {'is moving' if self.moving else 'has no ends of travel'}.",
+                hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
+            )
         options, self.homed = self.options, False
         home = options.increments(options.home_m)
         self._ask("APL", 0)
@@ -204,11 +208,10 @@ class FaulhaberDriver(Positioner):
             raise PositionerError(f"The motor reports {place_m:g} m after homing to {options.home_m:g} m.")
         for setting in self._limits:
             self._keep(*setting)
-        if self._limits:
-            self._ask("APL", 1)
-            self._check_limits()
+        self._ask("APL", 1)
+        self._check_limits()
         self.homed = True
-        if self.enabled and self._limits:
+        if self.enabled:
             # Position control again, from a target that is known, within the ends of travel.
             (_, upper, _), (_, lower, _) = self._limits
             self._go(min(max(home, lower), upper), self._usual)
@@ -220,11 +223,10 @@ class FaulhaberDriver(Positioner):
             # The speed of the last retreat may still be set.
             (self._keep if setting[0] == "SP" else self._same)(*setting)
         self._speed = None
-        if self._limits:
-            self._check_limits()
+        self._check_limits()
 
     def _check_limits(self) -> None:
-        if not self._configuration() & Configuration.POSITION_LIMITS:
+        if not self._has(Configuration.POSITION_LIMITS):
             raise PositionerError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
 
     def _against_stop(self, stop: Callable[[], bool]) -> None:
@@ -347,8 +349,8 @@ class FaulhaberDriver(Positioner):
             before = value
         raise PositionerError(f"Two answers to {query} in a row always differ.", hint="Is the motor at rest?")
 
-    def _configuration(self) -> Configuration:
-        return Configuration(self._sure("CST"))
+    def _has(self, bits: Configuration) -> bool:
+        return self._sure("CST") & bits == bits
 
     def _keep(self, command: str, argument: int, query: str) -> None:
         """Set a number and read it back, once more if a digit was damaged on its way."""
