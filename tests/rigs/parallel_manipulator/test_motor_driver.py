@@ -204,7 +204,7 @@ def test_a_drive_that_kept_its_power_knows_its_place():
     assert place(link) == pytest.approx(1e-3, abs=STEP_M)
 
 
-@pytest.mark.parametrize("change", ["RESET", "DI", "APL0", "LL1000"])
+@pytest.mark.parametrize("change", ["DI", "APL0", "LL1000"])
 def test_a_drive_that_lost_something_is_homed_anew(change):
     _, link = ready()
     link.send(change.encode() + b"\r")
