@@ -331,13 +331,10 @@ class FaulhaberDriver(Positioner):
             while not self._exchange.ready:
                 for answer in self._exchange.pump(self._exchange.answer_s):
                     self._take(answer)
-            self._exchange.send(name, argument)
-            found: list[Answer] = []
-            while not found:
-                found = self._exchange.pump(self._exchange.answer_s)
-            if found[0].line is not None or name in ACKNOWLEDGED:
-                found[0].checked()
-                return found[0]
+            answer = self._exchange.ask(name, argument)
+            if answer.line is not None or name in ACKNOWLEDGED:
+                answer.checked()
+                return answer
 
     def _sure(self, query: str) -> int:
         """Return a number that two answers in a row agree on: there is no checksum."""
