@@ -24,8 +24,15 @@ class _Axis(NamedTuple):
 
     opened: Opened
     devices: EmulatedDevices
-    driver: Positioner
-    true_m: Callable[[], float]
+
+    @property
+    def driver(self) -> Any:
+        """The driver, a Positioner."""
+        return self.opened.driver
+
+    def true_m(self) -> float:
+        """Return the position of the emulator [m]."""
+        return float(self.opened.emulator.position_m)
 
     def stretch(self) -> tuple[float, float]:
         """Return the ends of a part of its travel, at most `MOVE_S` long, that contains its position."""
@@ -77,11 +84,9 @@ def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
     with emulated(subject, of_both=given) as (opened, devices):
-        emulator = opened.emulator
-        if not hasattr(emulator, "position_m"):
+        if not hasattr(opened.emulator, "position_m"):
             fail("emulator", "it has no `position_m`, the position of the axis as its driver counts [m]")
-        driver: Any = opened.driver
-        axis = _Axis(opened, devices, driver, lambda: float(emulator.position_m))
+        axis = _Axis(opened, devices)
         if homed:
             _home(axis)
         yield axis
