@@ -484,7 +484,7 @@ class Positioner(Driver):
         if not states:
             return []
         data = np.array([(one.position, one.current_a, one.target) for one in states])
-        marks = np.where(np.isfinite(data), int(Quality.GOOD), int(Quality.MISSING)).astype(np.uint8)
+        marks = ~np.isfinite(data) * np.uint8(Quality.MISSING)
         t_ns = np.array([one.t_ns for one in states], dtype=np.int64)
         return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]
 

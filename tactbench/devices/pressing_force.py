@@ -49,16 +49,15 @@ class PressingForce:
 
         self._entry, self.sign, self._counted = entry, entry.sign, ""
         self._plain = (entry.channel, entry.sign) == ("fz", 1)
-        names = {stream.name: [channel.name for channel in stream.channels] for stream in streams}
-        having = [stream for stream in streams if entry.channel in names[stream.name]]
-        if not having:
-            known = ", ".join(name for several in names.values() for name in several)
+        places = [(stream, place) for stream in streams for place in range(len(stream.channels))]
+        named = {stream.channels[place].name: (stream, place) for stream, place in reversed(places)}
+        if entry.channel not in named:
             raise UsageError(
-                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {', '.join(named)}.",
                 hint="Correct `channel:` under `force:` in the rig file.",
             )
-        stream = having[0]
-        self.stream, self.column = stream.name, names[stream.name].index(entry.channel)
+        stream, self.column = named[entry.channel]
+        self.stream = stream.name
         channels = list(stream.channels)
         self.zero: FloatArray = np.zeros(len(channels))
         self._forces = {place: channel.name for place, channel in enumerate(channels) if channel.unit == "N"}

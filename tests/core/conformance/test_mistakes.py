@@ -109,7 +109,7 @@ MISTAKES = [
     ("scale", "Quality.SATURATED,", "Quality.GOOD,", "device-is-fit-for-a-rig", "not marked SATURATED"),
     ("stage", 'unit="m"', 'unit="mm"', "device-is-fit-for-a-rig", "position.unit"),
     ("stage", 'self.link.write(b"go")', 'self.link.write(b"run"); self.link.write(b"go")',
-     "device-is-fit-for-a-rig", "nobody has moved it"),
+     "device-is-fit-for-a-rig", "without a move"),
     ("axis", '(b"S\\n")', '(b"?\\n")', "axis-halts-and-retreats", "goes on"),
     ("axis", "self.check_move(position)", "pass", "axis-is-homed", "before it is homed"),
     ("axis", "self.check_move(position)", "self.enabled = self.enabled or self.check_move(position)",
