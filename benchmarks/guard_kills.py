@@ -60,9 +60,6 @@ def rig(text: str) -> None:
     def say(**values: Any) -> None:
         print(json.dumps(values), flush=True)
 
-    def clock() -> int:
-        return time.monotonic_ns() - int(given["process"]["clock_zero_ns"])
-
     said = ""
 
     def change(beat: Any, _since_s: float) -> Any:
@@ -72,7 +69,7 @@ def rig(text: str) -> None:
             say(phase=said)
         return beat
 
-    press = faults.Press(guard, setting, clock, change, hold_s=20.0)
+    press = faults.Press(guard, setting, time.monotonic_ns, change, hold_s=20.0)
     try:
         guard.start()
         say(guard=guard._process.pid, sibling=sibling)
@@ -144,7 +141,6 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
         heartbeat_s=heartbeat_s,
     )
     world = faults.Pressed(setting)
-    zero_ns = time.monotonic_ns() - world.clock()
     options, addresses = world.settings(), world.devices.addresses
     limits = setting.limits
     with world.devices, tempfile.TemporaryDirectory() as folder:
@@ -153,7 +149,6 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
             {"motor": DeviceSettings(f"{PACKAGE}.motor.driver:FaulhaberDriver", addresses["motor"], options["motor"])},
             DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:NetFtDriver", addresses["force"], options["force"]),
             str(log),
-            zero_ns,
         )
         given = {"setting": asdict(setting), "process": asdict(settings), "sibling": scenario.sibling}
         process = subprocess.Popen(

@@ -116,10 +116,6 @@ class Driver(ABC):
     def stop(self) -> None:
         """Let the device stop sampling, and drop data under way. Raises nothing if the device is gone."""
 
-    def tare(self) -> bool:
-        """Let the device take its present reading as zero; return whether it supports this."""
-        return False
-
     def close(self) -> None:
         """Stop if it is sampling, and close the link; a second call does nothing."""
         self.stop()

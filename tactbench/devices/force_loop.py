@@ -62,14 +62,13 @@ class ForceLaw:
 
     def __post_init__(self) -> None:
         gains = (self.proportional, self.integral)
-        positive = (self.period_s, self.speed, self.windup_s, self.feed_forward, self.cutoff_hz or 1.0)
-        for wrong, problem in (
-            (not all(0 <= gain < math.inf for gain in gains) or gains == (0.0, 0.0), "its gains are negative or all 0"),
-            (not all(value > 0 for value in positive), "a period, speed, time, rate or stiffness is not above 0"),
-            (not self.travel[0] < self.travel[1], "its travel ends before it begins"),
+        positive = (self.period_s, self.speed, self.windup_s, self.feed_forward, self.cutoff_hz or 1.0, max(gains))
+        if not (
+            all(0 <= gain < math.inf for gain in gains)
+            and all(value > 0 for value in positive)
+            and self.travel[0] < self.travel[1]
         ):
-            if wrong:
-                raise UsageError(f"The force loop cannot be stepped: {problem}.", hint="Correct its numbers.")
+            raise UsageError(f"The force loop cannot be stepped: {self}.", hint="Correct its numbers.")
 
     def kept(self, passed_s: float) -> float:
         """Return a, the share of its past that the filter keeps after a time."""

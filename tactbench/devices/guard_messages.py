@@ -133,23 +133,24 @@ class Limits:
         return np.asarray(self.sign * (data[:, self.channel] - self.zero[self.channel]))
 
     def __post_init__(self) -> None:
-        positive = [
+        positive = (
             self.force_ceiling_n, self.travel_ceiling_n, self.touch_n, self.step_m, self.speed_m_s, self.heartbeat_s,
             self.force_age_s, self.clear_n, self.clear_s,
-            *([] if self.torque_ceiling_nm is None else [self.torque_ceiling_nm]),
-        ]  # fmt: skip
+            1.0 if self.torque_ceiling_nm is None else self.torque_ceiling_nm,
+        )  # fmt: skip
         low, high = self.travel_m
-        for wrong, problem in (
-            (not all(0 < value < math.inf for value in positive), "a ceiling, step, speed or time is not positive"),
-            (not -math.inf < low < high < math.inf, "the travel ends before it begins"),
-            (not self.touch_n < self.force_ceiling_n, "the touch's force is not below the ceiling"),
-            (self.travel_ceiling_n > self.force_ceiling_n, "the ceiling of travel is above that of pressing"),
-            (not all(map(math.isfinite, self.zero)), "a zero is not finite"),
-            (not 0 <= self.channel < len(self.zero), "the pressing channel has no zero"),
-            (self.sign not in (-1, 1), "the sign is neither 1 nor -1"),
+        if not (
+            all(0 < value < math.inf for value in positive)
+            and -math.inf < low < high < math.inf
+            and self.touch_n < self.force_ceiling_n >= self.travel_ceiling_n
+            and all(map(math.isfinite, self.zero))
+            and 0 <= self.channel < len(self.zero)
+            and self.sign in (-1, 1)
         ):
-            if wrong:
-                raise UsageError(f"The guard's limits are wrong: {problem}.", hint="See docs/hardware.md, Safety.")
+            raise UsageError(
+                f"The guard's limits are not positive and finite, or contradict each other: {self}.",
+                hint="See docs/hardware.md, Safety.",
+            )
 
 
 @dataclass(frozen=True)

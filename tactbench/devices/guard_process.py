@@ -33,6 +33,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, NoReturn, TypeAlias
 
 from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchError, UsageError
@@ -51,7 +52,6 @@ from tactbench.devices.guard_messages import (
     Trigger,
 )
 from tactbench.links.address import open_link
-from tactbench.links.link import Clock
 
 START_S = 60.0
 """Timeout for the start of the process and of all devices (assumed: imports of a busy machine)."""
@@ -75,16 +75,15 @@ class DeviceSettings:
     """Address."""
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def open(self, clock: Clock) -> Any:
+    def open(self) -> Any:
         """Return the driver; raises LinkError if the link cannot be opened within `OPEN_S`."""
         build = pkgutil.resolve_name(self.driver)
-        settings = DriverSettings(partial(open_link, self.link, clock), options=self.options, clock=clock)
-        until_ns = clock() + round(1e9 * OPEN_S)
+        until_s = time.monotonic() + OPEN_S
         while True:
             try:
-                return build(settings)
+                return build(DriverSettings(partial(open_link, self.link), options=self.options))
             except LinkError as error:
-                if isinstance(error, LinkClosed) or clock() > until_ns:
+                if isinstance(error, LinkClosed) or time.monotonic() > until_s:
                     raise
                 time.sleep(1e-3)
 
@@ -99,12 +98,6 @@ class ProcessSettings:
     log: str
     """Path of the log, to which each event is appended as a line of JSON. A file beside it, ending in ``.not-out``,
     exists while the pressing axis is not known to be clear of the sensor; the next guard reads it."""
-    clock_zero_ns: int = 0
-    """``time.monotonic_ns()`` at zero of the rig's clock."""
-
-    def clock(self) -> Clock:
-        """Return the rig's clock, which every process on this machine can read."""
-        return lambda: time.monotonic_ns() - self.clock_zero_ns
 
     def rescue(self, *, retreat: bool) -> str:
         """Open the axes' links, halt all axes, and let the pressing axis retreat if `retreat`; return the outcome.
@@ -119,7 +112,7 @@ class ProcessSettings:
         for name in (*others, press):
             away = retreat and name == press
             try:
-                with self.axes[name].open(self.clock()) as axis:
+                with self.axes[name].open() as axis:
                     place = axis.rescue(retreat_seconds(axis) if away else None)
                     if away:
                         outcome = f"{name} has retreated to {place:g} m, and the force there was not looked at"
@@ -155,9 +148,9 @@ class GuardProcess:
     def __init__(self, settings: ProcessSettings) -> None:
         if os.name != "posix":
             raise UsageError("The guard's process needs sessions and signals of POSIX.", hint="Use Linux.")
-        self._settings, self._clock = settings, settings.clock()
+        self._settings = settings
         self._limits: Limits | None = None
-        self._requested = ""
+        self._requested, self._number = "", 0
         self._closed = False
         self._lost: GuardLostError | None = None
         self.force_blocks: list[Block] = []
@@ -199,9 +192,8 @@ class GuardProcess:
 
     def advance(self, until_ns: int) -> None:
         """Wait until the clock is at a nanosecond, and receive the samples and events since the last request."""
-        # Without a request out, the connection is readable only at its end.
-        if self._lost is None and self._connection.poll(max(0.0, 1e-9 * (until_ns - self._clock()))):
-            self._fail("its connection has ended")
+        if self._lost is None:
+            self._connection.poll(max(0.0, 1e-9 * (until_ns - time.monotonic_ns())))  # its end ends the wait
         self._request("collect", self._timeout_s)
 
     def disarm(self) -> Report:
@@ -216,7 +208,7 @@ class GuardProcess:
             return
         self._closed = True
         with suppress(OSError):
-            self._connection.send(("close", None))
+            self._connection.send((0, "close", None))
         try:
             self._process.wait(ARM_S)
         except subprocess.TimeoutExpired:
@@ -233,17 +225,19 @@ class GuardProcess:
         """Send a request and return its result; raises the error that the process answers, or GuardLostError."""
         if self._lost is not None:
             raise self._lost
-        self._requested = what
+        self._requested, self._number, number = what, self._number + 1, 0
+        until_s = time.monotonic() + timeout_s
         try:
-            self._connection.send((what, given))
-            if not self._connection.poll(timeout_s):
-                self._fail(f"it has not answered within {timeout_s:.3f} s")
-            result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
-        except (EOFError, OSError):
+            self._connection.send((self._number, what, given))
+            while number != self._number:  # an answer to an interrupted request comes before
+                if not self._connection.poll(max(0.0, until_s - time.monotonic())):
+                    self._fail(f"it has not answered within {timeout_s:.3f} s")
+                number, result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
+                self.force_blocks += force_blocks
+                self.motor_blocks += motor_blocks
+                self.events += events
+        except (EOFError, OSError, UnpicklingError):
             self._fail("its connection has ended")
-        self.force_blocks += force_blocks
-        self.motor_blocks += motor_blocks
-        self.events += events
         if isinstance(result, TactbenchError):
             raise result
         return result
@@ -262,7 +256,7 @@ class GuardProcess:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
         text = f"The guard's process is lost: {why}; {outcome}."
-        self.events.append(Event(self._clock(), GuardState.FAULT, trigger, math.nan, math.nan, text))
+        self.events.append(Event(time.monotonic_ns(), GuardState.FAULT, trigger, math.nan, math.nan, text))
         self._lost = GuardLostError(text, hint=f"Its last events are in {self._settings.log}.")
         raise self._lost
 
@@ -277,7 +271,6 @@ class _Server:
     def __init__(self, connection: Connection[Any, Any]) -> None:
         self._connection, self._parent = connection, os.getppid()
         self._guard: LocalGuard | None = None
-        self._clock: Clock = time.monotonic_ns
         self._closing = self._rig_gone = self.terminated = False
 
     def run(self) -> None:
@@ -289,7 +282,7 @@ class _Server:
         if self._guard is not None:
             with suppress(TactbenchError):
                 self._guard.close()
-            _log({"left": self._clock()})
+            _log({"left": time.monotonic_ns()})
 
     def _over(self) -> bool:
         guard = self._guard
@@ -308,10 +301,10 @@ class _Server:
     def _serve(self, timeout_s: float) -> None:
         try:
             while not self._rig_gone and not self._closing and self._connection.poll(timeout_s):
-                what, given = self._connection.recv()
+                number, what, given = self._connection.recv()
                 self._closing = what == "close"
                 if not self._closing:
-                    self._connection.send(self._answer(what, given))
+                    self._connection.send((number, *self._answer(what, given)))
                 timeout_s = 0.0
         except (EOFError, OSError):  # a rig that takes no answer counts as gone
             self._rig_gone = True
@@ -338,14 +331,13 @@ class _Server:
         return answer
 
     def _start(self, settings: ProcessSettings) -> Any:
-        self._clock = clock = settings.clock()
-        _log({"started": clock(), "unix_ns": time.time_ns(), "pid": os.getpid()})
+        _log({"started": time.monotonic_ns(), "unix_ns": time.time_ns(), "pid": os.getpid()})
         with ExitStack() as opened:
             guard = LocalGuard(
-                {name: opened.enter_context(axis.open(clock)) for name, axis in settings.axes.items()},
-                opened.enter_context(settings.force.open(clock)),
-                clock,
-                lambda until_ns: time.sleep(max(0.0, 1e-9 * (until_ns - clock()))),
+                {name: opened.enter_context(axis.open()) for name, axis in settings.axes.items()},
+                opened.enter_context(settings.force.open()),
+                time.monotonic_ns,
+                lambda until_ns: time.sleep(max(0.0, 1e-9 * (until_ns - time.monotonic_ns()))),
                 on_event=lambda event: _log(asdict(event)),
                 interrupted=self._interrupted,
                 kept=Path(settings.log).with_suffix(".not-out"),

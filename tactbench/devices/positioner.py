@@ -284,7 +284,10 @@ class Positioner(Driver):
         self.retreat()
         until_ns = self.clock() + round(1e9 * within_s)
         while self.clock() < until_ns:
-            self.update(0.01)
+            try:
+                self.update(0.01)
+            except PositionerError:  # half an answer to the other process, or a lost one
+                self.retreat()
             if not self.moving:
                 return self.position
         raise PositionerSilentError(f"The retreat has not ended within {within_s:.1f} s, at {self.position:g} m.")
@@ -317,7 +320,7 @@ class Positioner(Driver):
         current_a: float = math.nan,
         problem: str = "",
     ) -> None:
-        """Note an answer: its time, the position, whether the axis is reported idle, and what else is reported.
+        """Note an answer: its time, the position, whether the controller reports that the axis is idle, and the rest.
 
         A move ends when the axis is idle at its target; an idle axis elsewhere has not begun. A halt ends when it is
         idle and the position is that of the answer before. A homed axis that moves on after the time of braking is
@@ -481,7 +484,7 @@ class Positioner(Driver):
         if not states:
             return []
         data = np.array([(one.position, one.current_a, one.target) for one in states])
-        marks = np.where(np.isfinite(data), int(Quality.GOOD), int(Quality.MISSING)).astype(np.uint8)
+        marks = ~np.isfinite(data) * np.uint8(Quality.MISSING)
         t_ns = np.array([one.t_ns for one in states], dtype=np.int64)
         return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]
 

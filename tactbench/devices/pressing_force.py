@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,8 @@ class PressingForce:
         Streams of the force sensor; the pressing channel has sign 1, and the name `normal` where it is not plain `fz`.
     stream, column, sign
         Stream and column of the pressing force, and 1 or -1: pressing makes the device's channel rise or fall.
+    zero
+        (channels,) zero of that stream; 0 until it is taken.
 
     Raises
     ------
@@ -43,27 +45,29 @@ class PressingForce:
     """
 
     def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
-        self._entry, self.sign = entry, entry.sign
-        self._zeroed: dict[str, Scalar] = {}
+        import numpy as np
+
+        self._entry, self.sign, self._counted = entry, entry.sign, ""
         self._plain = (entry.channel, entry.sign) == ("fz", 1)
-        names = {stream.name: [channel.name for channel in stream.channels] for stream in streams}
-        having = [stream for stream in streams if entry.channel in names[stream.name]]
-        if not having:
-            known = ", ".join(name for several in names.values() for name in several)
+        places = [(stream, place) for stream in streams for place in range(len(stream.channels))]
+        named = {stream.channels[place].name: (stream, place) for stream, place in reversed(places)}
+        if entry.channel not in named:
             raise UsageError(
-                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {', '.join(named)}.",
                 hint="Correct `channel:` under `force:` in the rig file.",
             )
-        stream = having[0]
-        self.stream, self.column = stream.name, names[stream.name].index(entry.channel)
+        stream, self.column = named[entry.channel]
+        self.stream = stream.name
         channels = list(stream.channels)
+        self.zero: FloatArray = np.zeros(len(channels))
+        self._forces = {place: channel.name for place, channel in enumerate(channels) if channel.unit == "N"}
         update = {"sign": 1} if self._plain else {"sign": 1, "name": _PRESSED}
         channels[self.column] = ChannelSpec.model_validate({**dict(channels[self.column]), **update})
         pressed = stream.model_copy(update={"channels": tuple(channels)})
         self.streams = tuple(pressed if one is stream else one for one in streams)
 
-    def zero(self, blocks: Iterable[Block]) -> dict[str, FloatArray]:
-        """Return the zero of every channel, by stream: the mean of `blocks`, which were read without load.
+    def take_zero(self, blocks: Iterable[Block]) -> None:
+        """Set the zero of every channel of the stream: the mean of `blocks`, which were read without load.
 
         Every channel of unit N is tested: the size of its mean, its spread, its drift (the last third's mean less the
         first's). Rows that are no numbers or are marked are counted and left out.
@@ -75,30 +79,29 @@ class PressingForce:
         """
         import numpy as np
 
-        entry, came = self._entry, list(blocks)
-        found = {stream.name: np.zeros(len(stream.channels)) for stream in self.streams}
-        for stream in self.streams if entry.zero_s > 0 else ():
-            own = [block for block in came if block.stream == stream.name]
-            rows = np.concatenate([np.empty((0, len(stream.channels))), *(block.data for block in own)])
-            marks = [block.quality if block.quality is not None else np.zeros(block.data.shape) for block in own]
-            good = np.isfinite(rows).all(axis=1) & ~np.concatenate([np.empty((0, rows.shape[1])), *marks]).any(axis=1)
-            counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them no numbers or marked"
-            if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
-                raise RigError(
-                    f"The force has no zero: {counted}.", hint="Look at the force sensor: `tactbench doctor` reads it."
-                )
-            rows = rows[good]
-            forces = [place for place, channel in enumerate(stream.channels) if channel.unit == "N"]
-            wrong = [text for place in forces for text in self._at_rest(stream.channels[place].name, rows[:, place])]
-            if wrong:
-                raise RigError(
-                    f"The force sensor is not at rest, and its zero is refused: {'; '.join(wrong)} ({counted}).",
-                    hint="Take hands and loads off and start again; else bias the sensor, or state its range_n, "
-                    "noise_n and largest_zero_n under `force:`.",
-                )
-            found[stream.name] = rows.mean(axis=0)
-            self._zeroed[f"zero rows of {stream.name}"] = counted
-        return found
+        entry = self._entry
+        if entry.zero_s == 0:
+            return
+        own = [
+            np.where(0 if block.quality is None else block.quality, np.nan, block.data)
+            for block in blocks
+            if block.stream == self.stream
+        ]
+        rows = np.concatenate([np.empty((0, self.zero.size)), *own])
+        good = np.isfinite(rows).all(axis=1)
+        self._counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them no numbers or marked"
+        if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
+            hint = "Look at the force sensor: `tactbench doctor` reads it."
+            raise RigError(f"The force has no zero: {self._counted}.", hint=hint)
+        rows = rows[good]
+        wrong = [text for place, name in self._forces.items() for text in self._at_rest(name, rows[:, place])]
+        if wrong:
+            raise RigError(
+                f"The force sensor is not at rest, and its zero is refused: {'; '.join(wrong)} ({self._counted}).",
+                hint="Take hands and loads off and start again; else bias the sensor, or state its range_n, noise_n "
+                "and largest_zero_n under `force:`.",
+            )
+        self.zero = rows.mean(axis=0)
 
     def _at_rest(self, name: str, values: FloatArray) -> Iterator[str]:
         """Yield the problems of one channel's readings without load."""
@@ -119,18 +122,17 @@ class PressingForce:
             if abs(value) > most:
                 yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
 
-    def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
-        """Return facts for a recording: the mounting, and the `zero` that is subtracted, by stream."""
-        said = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
+    def about(self) -> dict[str, Scalar]:
+        """Return facts for a recording: the mounting, and the zero."""
+        about: dict[str, Scalar] = {f"zero of {self.stream}": ", ".join(f"{value:.6g}" for value in self.zero)}
         if not self._plain:
-            said["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
-        return {**said, **self._zeroed}
+            about["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
+        return {**about, **({f"zero rows of {self.stream}": self._counted} if self._counted else {})}
 
-    def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
-        """Return a block less the `zero`, by stream, with the pressing force positive when pressing."""
-        if block.stream not in zero:
+    def turned(self, block: Block) -> Block:
+        """Return a block; one of the stream less the zero, with the pressing force positive when pressing."""
+        if block.stream != self.stream:
             return block
-        data = block.data - zero[block.stream]
-        if block.stream == self.stream:
-            data[:, self.column] *= self.sign
+        data = block.data - self.zero
+        data[:, self.column] *= self.sign
         return replace(block, data=data)

@@ -20,7 +20,7 @@ from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
-from tactbench.core.spec.rig_file import FORCE, DeviceEntry, RigFile
+from tactbench.core.spec.rig_file import FORCE, RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.scene_samples import SceneSamples
@@ -127,24 +127,13 @@ def serve(
 
 def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], control: str) -> RigFile:
     """Return the rig file that opens emulated devices at their addresses."""
-
-    def opening(entries: Mapping[str, DeviceEntry]) -> dict[str, Any]:
-        found = dict(entries)
-        for name in addresses.keys() & entries.keys():
-            options = options_of(descriptor_of(registry, name, entries[name]), entries[name])
-            update = {"link": addresses[name], "options": options, "faults": (), "emulator": True}
-            found[name] = entries[name].model_copy(update=update)
-        return found
-
-    force = {} if file.force is None else opening({FORCE: file.force})
-    return file.model_copy(
-        update={
-            "sensors": opening(file.sensors),
-            "devices": opening(file.devices),
-            "force": force.get(FORCE),
-            "emulation": file.emulation.model_copy(update={"control": control}),
-        }
-    )
+    plain, entries = file.model_dump(), file.entries()
+    for name, address in addresses.items():
+        part = plain if name == FORCE else plain["sensors" if name in file.sensors else "devices"]
+        options = options_of(descriptor_of(registry, name, entries[name]), entries[name])
+        part[name].update(link=address, options=options, faults=(), emulator=True)
+    plain["emulation"]["control"] = control
+    return type(file).model_validate(plain)
 
 
 class ScenePhysics(Rig):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -38,30 +37,17 @@ class _Kind(NamedTuple):
     options: type[BaseModel]
 
 
-KINDS = MappingProxyType(
-    {
-        "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _Line),
-        "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _Line),
-        "socket": _Kind("socket://192.168.1.5:4001", _None),
-        "loop": _Kind("loop://", _None),
-        "can": _Kind("can://socketcan/can0", _None),
-        "udp": _Kind("udp://192.168.1.1:49152", _None),
-        "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
-        "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
-    }
-)
+KINDS = {
+    "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _Line),
+    "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _Line),
+    "socket": _Kind("socket://192.168.1.5:4001", _None),
+    "loop": _Kind("loop://", _None),
+    "can": _Kind("can://socketcan/can0", _None),
+    "udp": _Kind("udp://192.168.1.1:49152", _None),
+    "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
+    "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
+}
 """Kind of link -> example and keys of its address; the keys of ``can`` are python-can's."""
-
-
-class LinkAddress(NamedTuple):
-    """The parts of an address ``scheme://target?key=value&key=value``."""
-
-    kind: str
-    """A key of :data:`KINDS`."""
-    target: str
-    """Port, channel, host or file; of ``can`` the interface, a slash and the channel."""
-    options: Mapping[str, Any]
-    """Keys and values, as the link takes them."""
 
 
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -90,8 +76,17 @@ def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hin
         ) from error
 
 
-def parse_address(text: str) -> LinkAddress:
-    """Return the parts of an address; nothing is opened.
+def parse_address(text: str) -> tuple[str, str, dict[str, Any]]:
+    """Return the parts of an address ``scheme://target?key=value&key=value``; nothing is opened.
+
+    Returns
+    -------
+    kind
+        A key of :data:`KINDS`.
+    target
+        Port, channel, host or file; of ``can`` the interface, a slash and the channel.
+    options
+        Keys and values, as the link takes them.
 
     Raises
     ------
@@ -119,7 +114,7 @@ def parse_address(text: str) -> LinkAddress:
         raise _wrong(text, kind, "lacks its target")
     if kind in ("udp", "socket") and not all(_host_and_port(target)):
         raise _wrong(text, kind, "does not end in a host and a port, 1 to 65535")
-    return LinkAddress(kind, target, MappingProxyType(_options(text, kind, query)))
+    return kind, target, _options(text, kind, query)
 
 
 def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
@@ -145,8 +140,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     from tactbench.links.spi_bridge import SpiBridge
     from tactbench.links.spi_link import SpidevLink
 
-    kind, target, given = parse_address(address)
-    options = dict(given)
+    kind, target, options = parse_address(address)
     match kind:
         case "udp":
             return UdpLink(*_host_and_port(target), clock=clock)

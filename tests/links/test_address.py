@@ -13,7 +13,7 @@ from tactbench.plugin.devices import LinkError, open_link
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_examples_are_addresses(kind):
-    assert parse_address(KINDS[kind].example).kind == kind
+    assert parse_address(KINDS[kind].example)[0] == kind
 
 
 @pytest.mark.parametrize(
@@ -32,8 +32,7 @@ def test_examples_are_addresses(kind):
     ],
 )  # fmt: skip
 def test_parts(text, kind, target, options):
-    address = parse_address(text)
-    assert address == (kind, target, options)
+    assert parse_address(text) == (kind, target, options)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +62,7 @@ def test_an_error_names_what_is_wrong_or_expected(text, named):
 @given(st.text(max_size=40) | st.builds("{}://{}?{}".format, st.sampled_from([*KINDS]), st.text(), st.text()))
 def test_any_text_is_an_address_or_a_usage_error(text):
     try:
-        kind = parse_address(text).kind
+        kind, _, _ = parse_address(text)
     except UsageError as error:
         kind, hint = None, error.hint
     assert kind in KINDS or hint

@@ -22,8 +22,6 @@ from tactbench.links.link import Clock
 
 READ_S = 0.25
 """Longest wait of one read."""
-MOST_NAMED = 6
-"""Most channels whose means are stated one by one."""
 RATE_TOLERANCE = 0.02
 """Relative difference from the stated rate that is a problem. Assumed: quartz is a hundred times better, a timer of
 whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
@@ -100,7 +98,7 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
     for name, stream in joined("driver.read", driver.streams, blocks).items():
         if len(stream.data):
             about, problems = _about(check.name, stream, order[name])
-            check.streams += [{**about, **record} for record in _levels(stream)]
+            check.streams += [{**about, **record} for record in _noise(stream)]
             check.problems += problems
         else:
             check.problems.append(f"Nothing came of its stream {name} within {seconds:g} s. {ByteLink.silence_hint}")
@@ -132,20 +130,16 @@ def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[
     }, problems  # fmt: skip
 
 
-def _levels(stream: StreamData) -> Iterator[dict[str, Any]]:
-    """Yield means and standard deviations of each kind of channel in one unit."""
+def _noise(stream: StreamData) -> Iterator[dict[str, Any]]:
+    """Yield the largest standard deviation of each kind of channel in one unit, and the constant channels."""
     values, channels = good(stream), stream.spec.channels
     for kind, unit in dict.fromkeys((channel.kind, channel.unit) for channel in channels):
-        named = {
-            one.name: values[:, place] for place, one in enumerate(channels) if (one.kind, one.unit) == (kind, unit)
-        }
-        columns = {name: found for name, column in named.items() if len(found := column[np.isfinite(column)]) > 1}
-        sds = {name: float(column.std(ddof=1)) for name, column in columns.items()}
-        means = {name: float(column.mean()) for name, column in columns.items()}
-        if len(means) > MOST_NAMED:
-            means = {"lowest": min(means.values()), "highest": max(means.values())}
-        noisiest = max(sds, key=sds.__getitem__, default=None)
+        own = [place for place, one in enumerate(channels) if (one.kind, one.unit) == (kind, unit)]
+        columns = {channels[place].name: values[np.isfinite(values[:, place]), place] for place in own}
+        sds = {name: float(column.std(ddof=1)) for name, column in columns.items() if len(column) > 1}
+        noisiest = max(sds, key=sds.__getitem__, default="")
         yield {
-            "kind": kind, "unit": unit, "mean": means, "sd_largest": sds.get(noisiest or ""), "noisiest": noisiest,
+            "kind": kind, "unit": unit, "sd_largest": sds.get(noisiest), "noisiest": noisiest,
+            "mean": float(np.nanmean(values[:, own])) if sds else None,
             "constant": [name for name, sd in sds.items() if sd == 0],
         }  # fmt: skip

@@ -48,25 +48,24 @@ def command(names: tuple[str, ...], rig_file: Path | None) -> None:
 def _named(registry: Registry, names: Sequence[str]) -> RigFile:
     """Return a rig file for the bench with every sensor and device named."""
     from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.spec.rig_file import EMULATED, FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
+    from tactbench.core.spec.rig_file import EMULATED, FORCE, RigFile
 
-    sensors: dict[str, DeviceEntry] = {}
-    others: dict[str, Any] = {}
+    plain: dict[str, Any] = {"rig": "bench", "sensors": {}, "devices": {}}
     for name in names:
         if name in registry.sensors:
-            sensors[name] = DeviceEntry(link=EMULATED)
+            plain["sensors"][name] = {"link": EMULATED}
         elif name in registry.devices:
             kind = registry.devices[name].kind
-            part, entry = (FORCE, ForceEntry) if kind == "force" else (kind, NamedDevice)
-            if part in others:
-                raise UsageError(f"A rig has one {part}, {name} would be another one.", hint="Name one of them.")
-            others[part] = entry(link=EMULATED, device=name)
+            part = plain if kind == FORCE else plain["devices"]
+            if kind in part:
+                raise UsageError(f"A rig has one {kind}, {name} would be another one.", hint="Name one of them.")
+            part[kind] = {"link": EMULATED, "device": name}
         else:
             raise UnknownNameError("sensor or device", name, [*registry.sensors.names(), *registry.devices.names()])
-    if not sensors:
+    if not plain["sensors"]:
         known = ", ".join(registry.sensors.names())
         raise UsageError("A rig has a sensor, and none is named.", hint=f"Name one beside them: {known}.")
-    return RigFile(rig="bench", sensors=sensors, force=others.pop(FORCE, None), devices=others)
+    return RigFile.model_validate(plain)
 
 
 def _print_file(live: RigFile) -> None:

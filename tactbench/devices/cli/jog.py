@@ -20,7 +20,7 @@ from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Limits
 from tactbench.devices.positioner import Positioner
 from tactbench.devices.pressing_force import PressingForce
-from tactbench.devices.rig_devices import descriptor_of, open_driver
+from tactbench.devices.rig_devices import drivers_of
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import RigCheck
@@ -57,13 +57,13 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
             emulators = load_object(registry.rigs[file.rig].emulators or "")(rig, registry)
             devices = stack.enter_context(EmulatedDevices(emulators.devices))
             clock, links = devices.clock, {one: devices.opener(one) for one in emulators.devices}
-        axis, force = (
-            stack.enter_context(open_driver(descriptor_of(registry, one, entry), entry, clock, links.get(one)))
-            for one, entry in ((name, file.devices[name]), (FORCE, file.force))
-        )
+        drivers = drivers_of(file, registry, next(iter(file.sensors)), links, clock, (name, FORCE))
+        for driver in drivers.values():
+            stack.callback(driver.close)
+        axis = drivers[name]
         if not isinstance(axis, Positioner):
             raise UsageError(f"The {name} is no Positioner.", hint="`--jog` moves an axis of the rig.")
-        move_by_steps(name, axis, force, file.force, would.travel_ceiling_n, ask, remark)
+        move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n, ask, remark)
 
 
 def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float,
@@ -82,10 +82,11 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     while clock() < until_ns:
         blocks += force.read(LOOK_S)
         axis.update(0.0)
+    pressing.take_zero(blocks)
     limits = Limits(
         force_ceiling_n=ceiling_n, travel_ceiling_n=ceiling_n, touch_n=ceiling_n / 2, travel_m=axis.facts.limits,
         step_m=LONGEST_M, speed_m_s=SPEED_M_S, heartbeat_s=OLD_S, force_age_s=OLD_S, channel=pressing.column,
-        sign=pressing.sign, zero=tuple(pressing.zero(blocks)[stream.name].tolist()),
+        sign=pressing.sign, zero=tuple(pressing.zero.tolist()),
         same_samples=10**9 if entry.emulated else Limits.same_samples,  # an emulated sensor at rest has no noise
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Checks of an axis that moves, on its emulator in virtual time: what its driver says against where the emulator is."""
+"""Checks of an axis that moves, on its emulator in virtual time: the driver's position against the emulator's."""
 
 from __future__ import annotations
 
@@ -15,27 +15,34 @@ from tactbench.devices.positioner import NotReadyError, Positioner
 PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
 PACE = {"speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-5, "retreat_speed_m_s": 5e-3}
 """Options of the axis where its descriptor's `emulated_options` state no others; homing finds the lower end."""
-HOMING_S, MOVE_S = 120.0, 2.0  # at most (assumed: 100 mm at 1 mm/s, and back); long axes are moved over a part alone
-LOOK_S, REST_S = 1e-3, 0.3  # between two looks at a moving axis, and for how long it must stand where it has ended
+HOMING_S, MOVE_S = 120.0, 2.0  # timeouts (assumed: 100 mm at 1 mm/s, and back); a long axis is moved over a part of it
+LOOK_S, REST_S = 1e-3, 0.3  # time between two looks at a moving axis; time for which it must stand after a move
 
 
 class _Axis(NamedTuple):
-    """An axis that is started, and where its emulator is."""
+    """An axis that is started, and its emulator's position."""
 
     opened: Opened
     devices: EmulatedDevices
-    driver: Positioner
-    true_m: Callable[[], float]
+
+    @property
+    def driver(self) -> Any:
+        """The driver, a Positioner."""
+        return self.opened.driver
+
+    def true_m(self) -> float:
+        """Return the position of the emulator [m]."""
+        return float(self.opened.emulator.position_m)
 
     def stretch(self) -> tuple[float, float]:
-        """Return the ends of a part of its travel, at most `MOVE_S` long, that begins or ends where it is."""
+        """Return the ends of a part of its travel, at most `MOVE_S` long, that contains its position."""
         (low, high), speed = self.driver.facts.limits, self.driver.facts.speed
         length = min(high - low, MOVE_S * speed)
         begin = min(max(low, self.driver.position), high - length)
         return begin, begin + length
 
     def wait(self, seconds: float, until: Callable[[], bool]) -> None:
-        """Let time pass until a condition holds, for so long at most."""
+        """Let time pass until a condition holds, at most some seconds."""
         end_ns = self.devices.clock() + round(1e9 * seconds)
         while not until() and (before_ns := self.devices.clock()) < end_ns:
             self.opened.call("update", LOOK_S)
@@ -77,11 +84,9 @@ def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
     with emulated(subject, of_both=given) as (opened, devices):
-        emulator: Any = devices.emulator_of(subject.name)
-        if not hasattr(emulator, "position_m"):
-            fail("emulator", "it has no `position_m`: where the axis is, as its driver counts [m]")
-        driver: Any = opened.driver
-        axis = _Axis(opened, devices, driver, lambda: float(emulator.position_m))
+        if not hasattr(opened.emulator, "position_m"):
+            fail("emulator", "it has no `position_m`, the position of the axis as its driver counts [m]")
+        axis = _Axis(opened, devices)
         if homed:
             _home(axis)
         yield axis
@@ -96,10 +101,10 @@ def _home(axis: _Axis) -> None:
 
 @check("device", needs="driver-reads")
 def axis_is_homed(subject: Subject) -> None:
-    """Before homing a position means nothing, and after it everything rests on it: ceiling, ends of travel, retreat.
+    """Before homing a position is unknown, and after it ceiling, ends of travel and retreat depend on it.
 
-    State resolution_m and stop_latency_s; refuse moves until home() has set `homed` (check_move); call the place that
-    homing finds `home_m`, and let home() return only once the axis stands.
+    State resolution_m and stop_latency_s; refuse moves until home() has set `homed` (check_move); the place that homing
+    finds is at `home_m`; let home() return only once the axis stands.
     """
     with _axis(subject, homed=False) as axis:
         facts = axis.driver.facts

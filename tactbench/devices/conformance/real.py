@@ -1,4 +1,4 @@
-"""Checks of the devices that a rig file names, which are read or press.
+"""Checks of the real devices of a rig file, which are read or press.
 
 They run in the process of the command, so that Ctrl-C reaches the rig, and without a limit of time.
 """
@@ -23,23 +23,23 @@ from tactbench.core.spec.sensor import Nuisances
 from tactbench.devices.conformance.driver import Opened, look_at
 from tactbench.devices.rig_devices import open_driver
 
-SECONDS, HOLD_S = 8.0, 1.0  # a motor that lifts off for the unloaded hold takes some of them to be back on the skin
-END, PEAK = 16, 99  # the end is the mean of the last sixteenth of the rows, the largest a percentile: noise is no peak
-LARGEST = 1.5  # times `REAL_N` at most (assumed: a loop that overshoots by half is badly tuned)
+SECONDS, HOLD_S = 8.0, 1.0  # a motor that lifts off for the unloaded hold needs some of them to return to the skin
+END, PEAK = 16, 99  # the end is the mean of the last sixteenth of the rows, the largest force a percentile
+LARGEST = 1.5  # largest force over `REAL_N` (assumed: a loop that overshoots by half is badly tuned)
 NOISY = 3.0  # factor by which a unit's noise may differ from the stated one (assumed: units and rooms differ by two)
 
 
 def _file(subject: Subject) -> RigFile:
     if subject.rig_file is None:
-        skip("no rig file is given: `--rig-file FILE` says which devices it has")
+        skip("no rig file is given: `--rig-file FILE` names the devices")
     return load_rig_file(subject.rig_file, subject.registry)
 
 
 @check("sensor", "device", mode="invasive", needs="code-names-resolve")
 def real_device_answers(subject: Subject) -> None:
-    """The emulator is what the author believes the device to be; only the device knows its rate and its noise at rest.
+    """The emulator is the author's model of the device; rate and noise at rest are measured on the device.
 
-    Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
+    Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and identities.
     """
     file = _file(subject)
     if subject.descriptor.driver is None:
@@ -49,7 +49,7 @@ def real_device_answers(subject: Subject) -> None:
         fail(str(subject.rig_file), f"it has no entry for {subject.name}")
     entry = named[subject.name]
     if entry.emulated:
-        skip("the rig file says that the device is emulated")
+        skip("the device is emulated in the rig file")
     with code_of("driver", subject):
         driver = open_driver(subject.descriptor, entry, time.monotonic_ns)
     opened = Opened(subject, driver, time.monotonic_ns)
@@ -76,14 +76,14 @@ def real_device_answers(subject: Subject) -> None:
 
 
 def _zeros(drawn: Mapping[str, Any]) -> list[float]:
-    """Return what was taken off the reference's channels as their zero, as PressingForce.about says it."""
+    """Return the zeros of the reference's channels, from the facts of PressingForce.about."""
     texts = [str(text) for name, text in sorted(drawn.items()) if name.startswith("zero of ")]
     return [float(one) for text in texts for one in text.split(",")]
 
 
 @check("rig", mode="invasive", needs="code-names-resolve")
 def real_rig_presses(subject: Subject) -> None:
-    """Estimators are taught the recorded force: it must not come late, with another sign or too far, nor stay.
+    """Estimators learn the recorded force: it must not be late, of another sign or too large, nor remain afterwards.
 
     Look at `tactbench doctor --rig-file FILE` for limits, at the sign and unit of the force sensor in the rig file,
     then at the gains of the force loop. Retreat at the end of each scene, also of one that failed; let `stop` retreat,

@@ -143,10 +143,6 @@ class EmulatedDevices:
         link = kinds.get(kind, VirtualByteLink)(name, self._virtual, self._lines[name])
         return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
-    def emulator_of(self, name: str) -> DeviceEmulator | SpiDeviceEmulator:
-        """Return the model of a device."""
-        return self._devices[name].emulator
-
     def opener(self, name: str) -> Callable[[], Link]:
         """Return the function that opens the host's end of a device's link, for DriverSettings."""
         return partial(self.open_link, name)

@@ -43,7 +43,6 @@ from tactbench.plugin.devices import (
 )
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock
 
 
@@ -59,13 +58,11 @@ class BenchAcquisition:
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
-    zero: Mapping[str, FloatArray]
-    """By stream of the force sensor: its (channels,) unloaded readings, which are subtracted."""
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
         for block in self.reading.blocks(self.duration_s):
-            yield block if self.force is None else self.force.turned(block, self.zero)
+            yield block if self.force is None else self.force.turned(block)
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -131,8 +128,10 @@ class Bench(Rig):
                 stack.callback(driver.close)
             identity = {name: driver.identify() for name, driver in drivers.items()}
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
-            zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
-            taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
+            taken = ""
+            if force is not None:
+                self._take_zero(force, file, drivers[FORCE], clock)
+                taken = f"Zero of the force: {force.zero[force.column]:.3g} N. "
             profile, duration_s = scene.profile, scene.profile.duration.to("s")
             text = (
                 f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
@@ -153,14 +152,13 @@ class Bench(Rig):
                 reference=() if force is None else force.streams,
                 plan=() if simulated is None else simulated.plan,
                 assumptions={} if simulated is None else simulated.assumptions,
-                drawn=drawn if force is None else drawn | force.about(zero),
+                drawn=drawn if force is None else drawn | force.about(),
                 reading=reading,
                 duration_s=duration_s,
                 force=force,
-                zero=zero,
             )
 
-    def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
+    def _take_zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> None:
         assert file.force is not None
         seconds = file.force.zero_s
         blocks: list[Block] = []
@@ -172,7 +170,7 @@ class Bench(Rig):
             while clock() < until_ns:
                 blocks += driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9)))
             driver.stop()
-        return force.zero(blocks)
+        force.take_zero(blocks)
 
 
 def build(context: RigContext) -> Bench:

@@ -51,7 +51,6 @@ from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, with_limits
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock, ScenePhysics
 
 STOP_S = 10.0
@@ -69,7 +68,6 @@ class PressAcquisition:
     about: Mapping[str, Scalar]
     """What is known of the scene at its beginning."""
     force: PressingForce = field(repr=False)
-    zero: Mapping[str, FloatArray] = field(repr=False)
     control: Control = field(repr=False)
     reading: Reading = field(repr=False)
     blocks: Iterator[Block] = field(repr=False)
@@ -101,7 +99,7 @@ class PressAcquisition:
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
             if last > first:
                 self._rows[block.stream] = self._rows.get(block.stream, 0) + last - first
-                yield self.force.turned(block.rows(slice(first, last)), self.zero)
+                yield self.force.turned(block.rows(slice(first, last)))
 
     def stop(self, why: str) -> str:
         """Let the motor retreat at once, and wait for it; return the instruction for the operator if it is not out.
@@ -263,7 +261,7 @@ class ParallelManipulator(Rig):
         (driver,) = session.opened(sensor.name, sensor.name)
         stack.callback(driver.close)
         identity = {**session.identity, sensor.name: driver.identify()}
-        force, zero, limits = session.measured_limits()
+        force, limits = session.measured_limits()
         press = Press(settings.press_plan(facts.resolution, guard.force_stream), _course(scene))
         control: Control | None = None
 
@@ -291,7 +289,7 @@ class ParallelManipulator(Rig):
         about: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
         about |= {f"{name} {key}": value for name, values in identity.items() for key, value in values.items()}
         about |= {
-            **force.about(zero),
+            **force.about(),
             "force chain": session.checked,
             "place x mm": placement.x.to("mm"),
             "place s mm": placement.s.to("mm"),
@@ -307,7 +305,6 @@ class ParallelManipulator(Rig):
             assumptions={} if simulated is None else simulated.assumptions,
             about=about,
             force=force,
-            zero=zero,
             control=control,
             reading=reading,
             blocks=blocks,

@@ -33,7 +33,7 @@ from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, Place, f
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, with_limits
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Block, FloatArray
+    from tactbench.plugin import Block
     from tactbench.plugin.devices import Clock, Link
 
 CHECK_S = 1.0
@@ -115,15 +115,15 @@ class Session:
 
     # The beginning of a scene -----------------------------------------------------------------------------------------
 
-    def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
-        """Take the force sensor's zero, nothing being armed; return it, and the limits for the guard.
+    def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, Limits]:
+        """Take the force sensor's zero, nothing being armed; return it, and the limits of the guard.
 
         `confirmed`: whether an operator has seen that the indenter is clear of the sensor.
         """
         assert self._file.force is not None
         settings, stream = self.settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
-        zero = force.zero(self._fresh(self._file.force.zero_s))[stream.name]
+        force.take_zero(self._fresh(self._file.force.zero_s))
         limits, touch = settings.limits, settings.touch
         kept = Limits(
             force_ceiling_n=limits.force_ceiling_n,
@@ -140,9 +140,9 @@ class Session:
             force_age_s=1e-3 * limits.force_age_ms,
             channel=force.column,
             sign=force.sign,
-            zero=tuple(zero.tolist()),
+            zero=tuple(force.zero.tolist()),
         )
-        return force, {stream.name: zero}, kept
+        return force, kept
 
     def _fresh(self, seconds: float) -> list[Block]:
         """Return the force samples that are received in the next seconds, without earlier ones."""
@@ -181,7 +181,7 @@ class Session:
                 f"The indenter is not known to be clear of the sensor: {unclear}. Bring it to its place of retreat by "
                 "hand or by the controller's own means, see that it touches nothing, and say so.",
             )
-        _, _, limits = self.measured_limits(confirmed=bool(unclear))
+        _, limits = self.measured_limits(confirmed=bool(unclear))
         self.checked = self.checked or self._check_force(limits, ask)
         report = guard.arm(limits)
         if not isinstance(delta, LinearDelta):

@@ -164,12 +164,6 @@ class FingertipDriver(Driver):
             with suppress(LinkError):
                 self._send(Transmit(on=False))
 
-    def tare(self) -> bool:
-        """Let the board take a new baseline, which is a new start; all its triangles pause for it."""
-        if self._sampling:
-            self.start()
-        return True
-
     def close(self) -> None:  # noqa: D102  (inherited)
         self.stop()
         self._link.close()

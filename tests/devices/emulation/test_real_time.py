@@ -63,26 +63,10 @@ def test_an_unplugged_terminal_is_gone():
             assert server.serve(1.5) == math.inf
             with pytest.raises(LinkUnplugged):
                 link.read(1.0)
-        with pytest.raises(LinkError, match="cannot be opened"):
+        with pytest.raises(LinkError):
             open_link(end.address)
     finally:
         server.close()
-
-
-def test_virtual_and_real_time_give_the_same_device_data():
-    """A device that samples by itself senses the same at its own times, whatever the host does."""
-
-    def recorded(time):
-        device = on("datagram", Recorder(0.01, lambda t_s: {"a": 1000 * t_s}))
-        with EmulatedDevices({"a": device}, time=time) as devices, devices.open_link("a") as link:
-            link.send(b"I am here")
-            return [link.receive(5.0).data for _ in range(30)]
-
-    # In real time the first may have been sent before the device knew to whom.
-    virtual, real = recorded("virtual"), recorded("real")
-    first = virtual.index(real[0])
-    assert first < 5
-    assert real[: 30 - first] == virtual[first:]
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
-
-import numpy as np
 import pytest
 
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
@@ -46,7 +42,7 @@ def say(link):
 def test_an_answer_comes_with_its_own_time_and_waits_are_virtual(kind):
     with EmulatedDevices({"a": answering(kind)}) as devices, devices.open_link("a") as link:
         say(link)
-        with pytest.raises(LinkTimeout, match=r"within 0\.1 s"):
+        with pytest.raises(LinkTimeout, match=r"0\.1 s"):
             link.receive(0.1)
         assert devices.clock() == 100 * MS
         came = link.receive(5.0)
@@ -106,35 +102,3 @@ def test_everything_happens_in_order_of_time_whoever_is_waited_for():
         devices.advance(100 * MS)
     assert seen == sorted(seen)
     assert len(seen) == 10 + 33
-
-
-def run(seed):
-    """Read four devices for three seconds, and return what came."""
-
-    def sensing(t_s):
-        return {"a": 100 * math.sin(t_s)}
-
-    rngs = [np.random.default_rng([seed, number]) for number in range(4)]
-    models = {
-        "stream": EmulatedDevice("bytes", Recorder(0.02, sensing, rngs[0])),
-        "bus": on("can", Recorder(0.005, sensing, rngs[1], can=True), "late:delay_s=0.02"),
-        "datagrams": on("datagram", Recorder(0.001, sensing, rngs[2]), "unplug:start_s=2.5"),
-        "spi": on("spi", Complement()),
-    }
-    came = {name: [] for name in models}
-    with EmulatedDevices(models) as devices:
-        links = {name: devices.open_link(name) for name in models}
-        while devices.clock() < 3000 * MS:
-            for name, link in links.items():
-                if name == "spi":
-                    link.send([SpiStep(bytes([len(came[name]) & 0xFF]))])
-                with contextlib.suppress(LinkTimeout, LinkUnplugged):
-                    came[name].append(link.receive(0.004))
-    return came
-
-
-def test_the_same_seed_gives_the_same_bytes_on_every_link_at_the_same_times():
-    first = run(1)
-    assert first == run(1)
-    assert all(len(log) > 100 for log in first.values())
-    assert first["datagrams"] != run(2)["datagrams"]

@@ -252,7 +252,7 @@ def test_what_cannot_be_is_refused_with_the_next_step(tmp_path):
     with pytest.raises(UsageError, match="replay"):
         bench(rig_file().model_copy(update={"emulation": EmulationSettings(physics="replay")}))
     mixed = rig_file()
-    with pytest.raises(UsageError, match="icub is a real device"):
+    with pytest.raises(UsageError, match="icub"):
         press(
             tmp_path / "p.h5",
             mixed.model_copy(update={"sensors": {"icub": DeviceEntry(link="can://virtual/mixed")}}),

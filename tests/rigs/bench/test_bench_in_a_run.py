@@ -8,8 +8,8 @@ from pathlib import Path
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rigs" / "bench-emulated.yaml"
 BIOTAC = "  biotac:\n    link: emulated\n"
 NET_FT = "  device: net-ft\n  link: emulated\n"
-SLOWER = "  options: {rate_hz: 250.0, counts_per_newton: 1.0e+6, counts_per_newton_metre: 1.0e+6}\n"
-"""A quarter of its records: a minute of them is sent and read three times."""
+SLOWER = "  options: {rate_hz: 100.0, counts_per_newton: 1.0e+6, counts_per_newton_metre: 1.0e+6}\n"
+"""A tenth of its records: a minute of them is sent and read three times."""
 
 
 def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):

@@ -39,7 +39,7 @@ class Rig:
             self.guard = self.world.guard(load_object(force_driver))
         else:
             addresses, options = self.world.devices.addresses, self.world.settings()
-            self.log = tmp_path / "guard.log"
+            self.log, self.clock = tmp_path / "guard.log", time.monotonic_ns
             self.guard = GuardProcess(
                 ProcessSettings(
                     {
@@ -51,7 +51,6 @@ class Rig:
                     },
                     DeviceSettings(force_driver, addresses["force"], options["force"]),
                     str(self.log),
-                    time.monotonic_ns() - self.clock(),
                 )
             )
 

@@ -1,8 +1,6 @@
 """A press through real bytes in virtual time: emulated motor, force sensor and fingertip on a spring."""
 
 import re
-from contextlib import contextmanager
-from itertools import islice
 
 import numpy as np
 import pytest
@@ -10,12 +8,10 @@ import pytest
 from tactbench.devices.guard_messages import Trigger
 from tactbench.devices.press import PressState
 from tactbench.plugin import NotApplicable, assumed, load_registry
-from tactbench.plugin.devices import GuardState, PositionerSilentError, RigFile, ScenePhysics, largest_force_n
+from tactbench.plugin.devices import GuardState, LinkError, RigFile, ScenePhysics, largest_force_n
 from tactbench.plugin.simulation import Slide
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of
-from tactbench.sensors.icub.emulator import Bus
 from tests.rigs.parallel_manipulator.spring import SpringRig, file_of, on_spring, pressed, ramp, with_joints
 
 QUICK = {
@@ -130,34 +126,12 @@ def test_scenes_that_the_rig_cannot_press_are_refused():
         pressed(rig, ramp().model_copy(update={"placement": off}))
 
 
-@contextmanager
-def silenced(monkeypatch):
-    """Let the iCub's boards send nothing, for at most 5 s of their time: who waits longer waits for ever."""
-    with monkeypatch.context() as patch:
-        begins_s = []
-
-        def poll(self, now_s):
-            begins_s.append(now_s)
-            assert now_s - begins_s[0] < 5.0
-            return []
-
-        patch.setattr(Bus, "poll", poll)
-        yield
-
-
-def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out(monkeypatch):
-    rig = ParallelManipulator(file_of(**RARER), None, ScenePhysics(SpringRig(5.0)))
-    with rig.open(load_registry().sensors["icub"], ramp(1.0, 0.3, 2.0), seed=1) as acquisition:
-        blocks = iter(acquisition)
-        first = list(islice(blocks, 20))
-        with silenced(monkeypatch):
-            rest = list(blocks)
-        assert acquisition.control.press.over
-        assert acquisition.control.report.state is GuardState.RETREATED
-    assert re.search(r" 1\d\d ms", acquisition.ended)
-    begin_s = 1e-9 * acquisition.begin_ns
-    last_s = {block.stream: 1e-9 * block.t_ns[-1] - begin_s for block in (*first, *rest)}
-    assert 0.1 < last_s["force_torque"] < 2.0
+def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out():
+    found = on_spring(5.0, ramp(1.0, 0.3, 2.0), sensors__icub__faults=["dropped-frame:start_s=6"], **RARER)
+    assert found.acquisition.control.press.over
+    assert found.acquisition.control.report.state is GuardState.RETREATED
+    assert re.search(r" 1\d\d ms", found.acquisition.ended)
+    assert 0.1 < found.t_s["force_torque"][-1] < 2.0
 
 
 def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
@@ -177,20 +151,8 @@ def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
     assert events[8:10] == ["disarmed", "armed"]
 
 
-def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent(monkeypatch):
-    feed, poll, motors, silent = MotorEmulator.feed, MotorEmulator.poll, [], []
-
-    def fed(self, piece, now_s):
-        if self not in motors:
-            motors.append(self)
-        # The third that is spoken to, after the linear motor and joint-1, sets about homing.
-        if motors.index(self) == 2 and b"AC" in piece:
-            silent.append(self)
-        sent = feed(self, piece, now_s)
-        return [] if self in silent else sent
-
-    monkeypatch.setattr(MotorEmulator, "feed", fed)
-    monkeypatch.setattr(MotorEmulator, "poll", lambda self, now_s: [] if self in silent else poll(self, now_s))
-    rig = ParallelManipulator(RigFile.model_validate(with_joints(**RARER)), None, ScenePhysics(SpringRig(5.0)))
-    with pytest.raises(PositionerSilentError, match=r"joint-2: .* AC"):
+def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent():
+    said = with_joints(**{"devices__joint-2__faults": ["late-answers:delay_s=9"]}, **RARER)
+    rig = ParallelManipulator(RigFile.model_validate(said), None, ScenePhysics(SpringRig(5.0)))
+    with pytest.raises(LinkError, match="joint-2"):
         pressed(rig, ramp(1.0, 0.3, 1.0))

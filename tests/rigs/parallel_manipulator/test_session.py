@@ -10,7 +10,7 @@ from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
 from tests.rigs.parallel_manipulator.presses import load
-from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, ramp, with_joints
+from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, file_of, ramp, with_joints
 from tests.rigs.parallel_manipulator.test_press import RARER
 
 FILE = RigFile.model_validate(
@@ -66,29 +66,23 @@ def session():
     one.close()
 
 
-def test_the_platform_is_where_it_believes_to_be_scene_after_scene(session):
-    rng = np.random.default_rng(7)
+def test_the_platform_is_where_it_believes_to_be_scene_after_scene_and_an_operator_is_asked_once(session):
+    rng, asked = np.random.default_rng(7), []
     for _ in range(3):
         xy_m = rng.uniform(-12e-3, 12e-3, 2)
-        place = session.travel(tuple(xy_m))
+        place = session.travel(tuple(xy_m), lambda doing, text: not asked.append(text))
         assert place == pytest.approx((*xy_m, -0.15), abs=20e-6)
         # Three rails, each within its corridor of 10 um.
         assert np.linalg.norm(true_place_m(session) - place) < 20e-6
     assert sum(event.text.startswith("homing") for event in session.guard.events) == 4
-
-
-def test_an_operator_is_asked_what_the_session_cannot_know_and_once(session):
-    asked = []
-    for _ in range(2):
-        session.travel((0.0, 0.0), lambda doing, text: not asked.append((doing, text)))
     clear, push, _ = asked
-    assert "joint-3" in clear[1]
-    assert "306 g" in push[1]
+    assert "joint-3" in clear
+    assert "306 g" in push
     assert session.checked.startswith("3 N ")
 
 
 def test_a_scene_is_the_same_in_its_own_session_each_time():
-    rig = ParallelManipulator(FILE, None, ScenePhysics(SpringRig(5.0)))
+    rig = ParallelManipulator(file_of(**RARER), None, ScenePhysics(SpringRig(5.0)))
     icub, found = load_registry().sensors["icub"], []
     for _ in range(2):
         with rig.open(icub, ramp(0.5, 0.2, 0.4), seed=1) as acquisition:
@@ -103,9 +97,9 @@ def test_the_zero_is_of_its_own_seconds_and_not_of_what_waited(session):
                                              "force_n": lambda self, x: 0.0})()  # fmt: skip
     session.emulated.advance(session.clock() + 200_000_000)
     session.emulators.press = pressed
-    _, zero, _ = session.measured_limits()
+    force, _ = session.measured_limits()
     # Of 300 samples a few were on their way; with the 200 that waited it would be 2 N.
-    assert abs(zero["force_torque"][2]) < 0.1
+    assert abs(force.zero[2]) < 0.1
 
 
 def test_force_while_the_platform_moves_stops_every_rail(session):
@@ -126,7 +120,7 @@ def test_force_while_the_platform_moves_stops_every_rail(session):
 
 def test_no_rail_moves_unless_the_motor_is_retracted(session):
     session.travel((0.0, 0.0))
-    _, _, limits = session.measured_limits()
+    _, limits = session.measured_limits()
     guard, report = session.guard, session.guard.arm(limits)
     guard.advance(session.clock() + 20_000_000)
     report = guard.beat(Beat(session.clock()))

@@ -105,7 +105,6 @@ def returning(lost_m):
 CHECKED = "reads"
 SCHEDULES = {
     # name: (stiffness [N/mm], what is wrong, changes of the rig file, what is said; empty: the press is complete)
-    "sound": (5.0, {}, {}, ""),
     "sound, soft foam": (2.2, {}, {}, ""),
     "sound, hard skin": (25.0, {}, {}, ""),
     "sign turned": (5.0, {"reads": times(-1)}, {}, CHECKED),
@@ -116,16 +115,13 @@ SCHEDULES = {
     "kgf, unchecked": (5.0, {"reads": times(1 / 9.80665)}, UNCHECKED, "no touch|softest"),
     "1e-4, unchecked": (25.0, {"reads": times(1e-4)}, UNCHECKED, "no touch"),
     "frozen after the check": (25.0, {"reads": Frozen(from_s=2.0)}, {}, "no touch"),
-    "frozen in the ramp": (5.0, {"reads": Frozen(from_n=1.0)}, {}, "softest"),
     "frozen in the ramp, hard": (25.0, {"reads": Frozen(from_n=3.0)}, {}, "softest"),
     "a third from 2 N on": (5.0, {"reads": later(0.3, 2.0)}, {}, "softest"),
     "zero falls": (5.0, {"reads": drifting(-0.2, 8.0)}, {}, "N are left|softest"),
     "zero rises": (5.0, {"reads": drifting(0.2, 8.0)}, {}, "N are left|stiffest"),
     "loaded while zeroed": (5.0, {"reads": loaded(2.4, 3.0)}, {}, "not arm"),
-    "pulled while zeroed": (5.0, {"reads": loaded(-2.4, 3.0)}, {}, "not arm"),
     "load that falls off at the touch": (5.0, {"reads": loaded_until_touched(2.4)}, {}, "no touch"),
     "pull that ends at the touch": (5.0, {"reads": loaded_until_touched(-2.4)}, {}, "N are left"),
-    "0.3 mm deeper": (5.0, {"slip": lambda at_m: 0.3e-3}, {}, ""),
     "2.2 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 2.2e-3}, {}, "before"),
     "3 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 3e-3}, {}, "refused"),
     "3 mm less deep": (5.0, {"slip": lambda at_m: -3e-3}, {}, "no touch"),

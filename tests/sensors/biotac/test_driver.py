@@ -255,7 +255,6 @@ def test_what_is_asked_while_it_samples_is_refused():
             driver.identify()
         driver.stop()
         assert driver.identify() == SERIAL
-        assert not driver.tare()
 
 
 def test_no_sensor_is_said():

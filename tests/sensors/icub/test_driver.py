@@ -168,13 +168,6 @@ def test_after_the_stop_nothing_comes_and_a_start_begins_anew():
         driver.read(0.1)
 
 
-def test_a_tare_is_a_new_start():
-    with started() as (driver, link):
-        assert driver.tare()
-        assert link.now_s == pytest.approx(2 * SETTLE_S)
-        assert len(read_until(driver, link, 2 * SETTLE_S + 0.05).data) == 2
-
-
 def ten(*faults):
     """Return samples of ten periods from 0.52 s on, and what was counted; taxels fall by a count a period."""
     with started(faults=faults) as (driver, link):

@@ -124,30 +124,20 @@ class Drive:
     def __init__(self, load: Load | None, options: FaulhaberOptions, stops_m: tuple[float, float]) -> None:
         self.load, self.stops, self.now_s = load, stops_m, 0.0
         self._options = options
-        self.hot = False
-        self._motion = Motion(0.0, 0.0)
-        self._power_on()
-
-    def _power_on(self) -> None:
-        """Begin with settings that are assumed, and without a place (assumed: incremental)."""
-        of = self._options
-        self.settings = {
-            "SP": of.speed(0.05), "AC": of.acceleration(1.0), "DEC": of.acceleration(1.0),
-            "LPC": of.current(PEAK_CURRENT_A), "LCC": of.current(CONTINUOUS_CURRENT_A),
-            "GNL": of.increments(self.stops[0]), "GPL": of.increments(self.stops[1]),
+        self.settings = {  # assumed
+            "SP": options.speed(0.05), "AC": options.acceleration(1.0), "DEC": options.acceleration(1.0),
+            "LPC": options.current(PEAK_CURRENT_A), "LCC": options.current(CONTINUOUS_CURRENT_A),
+            "GNL": options.increments(stops_m[0]), "GPL": options.increments(stops_m[1]),
             "CORRIDOR": 20, "APL": 0, "ANSW": 2,
         }  # fmt: skip
-        self.enabled = self._at_speed = False
-        self._stand()
-        self._origin_m = self.target_m = self.position_m
+        self.hot = self.enabled = self._at_speed = False
+        self._motion = Motion(0.0, 0.0)
+        self._origin_m = self.target_m = 0.0  # assumed: the encoder is incremental
         self._loaded_m: float | None = None
-
-    def _stand(self) -> None:
-        self._motion = Motion(self.now_s, self.position_m)
 
     def lose_power(self) -> None:
         """Stand without power, as after DI."""
-        self._stand()
+        self._motion = Motion(self.now_s, self.position_m)
         self.enabled = False
 
     @property
@@ -159,11 +149,6 @@ class Drive:
     def moving(self) -> bool:
         """Whether the reference moves, now or later, without a command."""
         return self.now_s < self._motion.end_s or self._motion.at(self.now_s)[1] != 0.0
-
-    @property
-    def speed_m_s(self) -> float:
-        """Of the motor."""
-        return 0.0 if self._pressed()[2] else self._motion.at(self.now_s)[1]
 
     def _pressed(self) -> tuple[float, float, bool]:
         """Return the motor's place [m], its force [N], and whether the force is at the current limit."""
@@ -188,7 +173,7 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Execute a command; return its answer, empty if it has none.
+        """Execute a command; return its answer.
 
         Raises
         ------
@@ -227,9 +212,6 @@ class Drive:
                 if limit == 0:
                     raise Refused(INVALID_PARAMETER)  # Assumed: zero has no sign that picks a limit.
                 self.settings["GPL" if limit > 0 else "GNL"] = limit
-            case "RESET":
-                self._power_on()
-                return ""  # Assumed.
             case _:
                 raise Refused(UNKNOWN_COMMAND)
         return OK
@@ -273,7 +255,7 @@ class Drive:
             case "POS" | "TPOS":
                 found = round(((place_m if name == "POS" else self.target_m) - self._origin_m) / of.increment_m)
             case "GN":
-                found = round(self.speed_m_s / of.speed_unit_m_s)
+                found = 0 if limited else round(self._motion.at(self.now_s)[1] / of.speed_unit_m_s)
             case "GRC":
                 found = round(abs(force_n) / FORCE_CONSTANT_N_A / of.current_unit_a)  # Without sign (assumed).
             case "OST":

@@ -35,8 +35,6 @@ LONGEST_AHEAD = 24
 """Bytes that may be ahead of a retreat: a question and a move, `TPOS`, `SP10000`, `LA-12345`, `M` and CRs (derived)."""
 TRIES = 5
 """Answers of which two in a row must agree (assumed: damaged lines are rare)."""
-AGAIN_S = 0.25
-"""Period after which a rescue sends its retreat again (assumed)."""
 STANDING_NS = 20_000_000
 """Period of the status polls of a motor at rest, which leave the line and the host idle meanwhile (assumed)."""
 
@@ -108,7 +106,7 @@ class FaulhaberDriver(Positioner):
     @property
     def counts(self) -> Mapping[str, int]:
         """The counts of :class:`Exchange` that are not 0."""
-        return {name: count for name, count in self._exchange.counts.items() if count}
+        return +self._exchange.counts
 
     def identify(self) -> Mapping[str, str]:
         """Return firmware, and model and serial number where the drive has them."""
@@ -125,7 +123,7 @@ class FaulhaberDriver(Positioner):
         # No source states the answer to ANSW itself.
         self._exchange.send("ANSW", 2)
         self._exchange.quiet()
-        if not self._configuration() & Configuration.ACKNOWLEDGES:
+        if not self._has(Configuration.ACKNOWLEDGES):
             raise PositionerError("The motor's drive does not acknowledge commands after ANSW2.")
         self._ask("SOR", 0)
         self._settings, _ = _required(self.options)
@@ -135,7 +133,7 @@ class FaulhaberDriver(Positioner):
         for setting in self._settings:
             self._keep(*setting)
         self._usual = self._speed = self._sure("GSP")
-        self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
+        self.enabled = self._has(Configuration.POWER_STAGE)
         if self.enabled:
             self.locate()
         self._watching = True
@@ -150,7 +148,7 @@ class FaulhaberDriver(Positioner):
     def enable(self) -> None:
         """Give the motor power; it holds its place. One whose target is elsewhere is without power again."""
         self._ask("EN")
-        self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
+        self.enabled = self._has(Configuration.POWER_STAGE)
         if not self.enabled:
             raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its supply.")
         place_m, target_m = self.locate()
@@ -178,10 +176,11 @@ class FaulhaberDriver(Positioner):
 
         A drive that was without supply has neither (assumed: its power stage is off until EN).
         """
-        kept = Configuration.POWER_STAGE | Configuration.POSITION_LIMITS
-        if not self._limits or self._configuration() & kept != kept:
-            return False
-        self.homed = all(self._sure(query) == argument for _, argument, query in self._limits)
+        self.homed = (
+            bool(self._limits)
+            and self._has(Configuration.POWER_STAGE | Configuration.POSITION_LIMITS)
+            and all(self._sure(query) == argument for _, argument, query in self._limits)
+        )
         if self.homed:
             self.locate()
         return self.homed
@@ -192,8 +191,11 @@ class FaulhaberDriver(Positioner):
         The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive has its
         usual limits of current again once the place is found.
         """
-        if self.moving:
-            raise NotReadyError("The motor is moving.", hint="Wait for the end of its move, or let it retreat.")
+        if self.moving or not self._limits:
+            raise NotReadyError(
+                f"The motor {'is moving' if self.moving else 'has no ends of travel'}.",
+                hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
+            )
         options, self.homed = self.options, False
         home = options.increments(options.home_m)
         self._ask("APL", 0)
@@ -206,11 +208,10 @@ class FaulhaberDriver(Positioner):
             raise PositionerError(f"The motor reports {place_m:g} m after homing to {options.home_m:g} m.")
         for setting in self._limits:
             self._keep(*setting)
-        if self._limits:
-            self._ask("APL", 1)
-            self._check_limits()
+        self._ask("APL", 1)
+        self._check_limits()
         self.homed = True
-        if self.enabled and self._limits:
+        if self.enabled:
             # Position control again, from a target that is known, within the ends of travel.
             (_, upper, _), (_, lower, _) = self._limits
             self._go(min(max(home, lower), upper), self._usual)
@@ -222,11 +223,10 @@ class FaulhaberDriver(Positioner):
             # The speed of the last retreat may still be set.
             (self._keep if setting[0] == "SP" else self._same)(*setting)
         self._speed = None
-        if self._limits:
-            self._check_limits()
+        self._check_limits()
 
     def _check_limits(self) -> None:
-        if not self._configuration() & Configuration.POSITION_LIMITS:
+        if not self._has(Configuration.POSITION_LIMITS):
             raise PositionerError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
 
     def _against_stop(self, stop: Callable[[], bool]) -> None:
@@ -309,31 +309,19 @@ class FaulhaberDriver(Positioner):
         self.state = self.state and replace(self.state, target=math.nan)
 
     def rescue(self, within_s: float | None) -> float:
-        """Retreat, or stand, with a drive that another process had; see `Positioner`.
+        """Retreat, or stand, with a drive that another process had, and which keeps its positions; see `Positioner`.
 
-        The drive keeps its positions; nothing else is assumed of what stands on the line. Half a command that may stand
-        there is ended first, so that the first answer may be a refusal.
+        Half a command that may stand on the line is ended first.
         """
-        target_m = self.facts.retreat
-        if within_s is None or math.isnan(target_m):
-            self.link.write(b"\r" + encode("V", 0))
+        command = encode("V", 0) if within_s is None else retreat_command(self.options)
+        self.link.write(b"\r" + command)
+        if within_s is None or math.isnan(self.facts.retreat):
             return math.nan
-        until_ns = self.clock() + round(1e9 * within_s)
-        sent_ns, there, place_m = -math.inf, 0, math.nan
-        while self.clock() < until_ns:
-            if not there and self.clock() - sent_ns > 1e9 * AGAIN_S:
-                self.link.write(b"\r" + retreat_command(self.options))
-                self._exchange.quiet()
-                sent_ns = self.clock()
-            with suppress(PositionerError):
-                place_m = self.options.position_m(self._ask("POS").value)
-                there = there + 1 if abs(place_m - target_m) <= self.facts.near else 0
-                if there == 2:  # One could be the late answer to another question.
-                    return place_m
-        raise PositionerError(
-            f"The motor was sent to {target_m:g} m and reports {place_m:g} m after {within_s:.1f} s.",
-            hint="Stand clear, cut its supply, and see what is in its way.",
-        )
+        self._exchange.quiet()
+        with suppress(PositionerError):
+            self.locate()
+        self._watching = True
+        return super().rescue(within_s)
 
     # Commands that are waited for -------------------------------------------------------------------------------------
 
@@ -343,13 +331,10 @@ class FaulhaberDriver(Positioner):
             while not self._exchange.ready:
                 for answer in self._exchange.pump(self._exchange.answer_s):
                     self._take(answer)
-            self._exchange.send(name, argument)
-            found: list[Answer] = []
-            while not found:
-                found = self._exchange.pump(self._exchange.answer_s)
-            if found[0].line is not None or name in ACKNOWLEDGED:
-                found[0].checked()
-                return found[0]
+            answer = self._exchange.ask(name, argument)
+            if answer.line is not None or name in ACKNOWLEDGED:
+                answer.checked()
+                return answer
 
     def _sure(self, query: str) -> int:
         """Return a number that two answers in a row agree on: there is no checksum."""
@@ -361,8 +346,8 @@ class FaulhaberDriver(Positioner):
             before = value
         raise PositionerError(f"Two answers to {query} in a row always differ.", hint="Is the motor at rest?")
 
-    def _configuration(self) -> Configuration:
-        return Configuration(self._sure("CST"))
+    def _has(self, bits: Configuration) -> bool:
+        return self._sure("CST") & bits == bits
 
     def _keep(self, command: str, argument: int, query: str) -> None:
         """Set a number and read it back, once more if a digit was damaged on its way."""

@@ -144,11 +144,10 @@ class MotorEmulator(DeviceEmulator):
             answer = self.drive.answer(command)
         except Refused as refusal:
             answer = str(refusal)
-        if answer:
-            late = self._active("late-answers", at_s)
-            # Answers keep the order of their commands, also when the fault ends between two of them.
-            self._answered_s = max(self._answered_s, at_s + ANSWER_S + (late.delay_s if late else 0.0))
-            self._send(answer, self._answered_s)
+        late = self._active("late-answers", at_s)
+        # Answers keep the order of their commands, also when the fault ends between two of them.
+        self._answered_s = max(self._answered_s, at_s + ANSWER_S + (late.delay_s if late else 0.0))
+        self._send(answer, self._answered_s)
 
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")

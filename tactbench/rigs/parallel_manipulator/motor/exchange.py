@@ -122,6 +122,14 @@ class Exchange:
                 found += self._assigned(line)
         return found if found or self.ready or self._clock() < due_ns else self._overdue()
 
+    def ask(self, name: str, argument: int | None = None) -> Answer:
+        """Send a command while none is outstanding, and return its outcome; raises as :meth:`pump`."""
+        self.send(name, argument)
+        found: list[Answer] = []
+        while not found:
+            found = self.pump(self.answer_s)
+        return found[0]
+
     def greet(self) -> str:
         """Find the drive: end a partial command on its line, and read its version until two answers are the same.
 
@@ -134,11 +142,7 @@ class Exchange:
         self.quiet()
         self.version, before = "", ""
         for _ in range(5):
-            self.send(MARK)
-            answers: list[Answer] = []
-            while not answers:
-                answers = self.pump(self.answer_s)
-            line = answers[0].line
+            line = self.ask(MARK).line
             if line is None:
                 self.quiet()
             elif line.text == before and line.kind is not Kind.REFUSAL:

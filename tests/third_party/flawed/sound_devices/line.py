@@ -81,16 +81,9 @@ class PadEmulator(FramedEmulator):
 
 class Scale(Framed):
     stream, layout, scale = FORCES, "i", 1e-3
-    _zero = np.zeros(3)
 
     def sample(self, values):
-        self._last = np.array(values)
-        full = np.abs(self._last) >= MOST_N
-        return Sample(list(self._last - self._zero), list(np.where(full, Quality.SATURATED, Quality.GOOD)))
-
-    def tare(self):
-        self._zero = self._last
-        return True
+        return Sample(values, list(np.where(np.abs(values) >= MOST_N, Quality.SATURATED, Quality.GOOD)))
 
 
 class ScaleEmulator(FramedEmulator):

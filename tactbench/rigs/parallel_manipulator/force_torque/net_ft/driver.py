@@ -77,11 +77,8 @@ class NetFtDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """``rejected`` datagrams; records with ``errors``, ``saturated`` ones among them, and with ``warnings``.
-
-        Those that are 0 are left out.
-        """
-        return {name: count for name, count in self._counts.items() if count}
+        """``rejected`` datagrams; records with ``errors``, ``saturated`` ones among them, and with ``warnings``."""
+        return +self._counts
 
     def identify(self) -> Mapping[str, str]:
         """Read two records; return rate and status.
