@@ -68,7 +68,7 @@ def _import_log(
     log: Path, sensor: str, options: dict[str, Any], labels: dict[str, Any], out: Path, replace: bool
 ) -> ImportReport:
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.recording.device_log import import_log
+    from tactbench.core.recording.mapping.importing import import_log
     from tactbench.core.spec.scene import Role
 
     session, role = str(labels.pop("session", "1")), labels.pop("role", None)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.core.samples import Block, Quality
+from tactbench.core.recording.format import Array
+from tactbench.core.samples import Block, IntArray, Quality
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig_file import Allowed
 from tactbench.core.spec.sensor import StreamSpec
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 INCOMPLETE = "incomplete: "
 """Beginning of `excluded` in the meta of an incomplete recording."""
@@ -31,7 +28,7 @@ class _Track:
     """Time of the last row with a number."""
     silence: tuple[int, int] = (0, 0)
     """Length and beginning of the longest time without one."""
-    row: npt.NDArray[Any] | None = None
+    row: Array | None = None
     """The last row."""
 
 
@@ -95,14 +92,14 @@ class Completeness:
         if pressing is not None and (~missing[:, pressing]).any():
             self._force.append((last, float(block.data[~missing[:, pressing], pressing].mean())))
 
-    def _silence(self, track: _Track, t_ns: npt.NDArray[np.int64]) -> None:
+    def _silence(self, track: _Track, t_ns: IntArray) -> None:
         before = self._begin_ns if track.last_ns is None else track.last_ns
         steps = np.diff(t_ns, prepend=before or 0)
         longest = int(steps.argmax())
         track.silence = max(track.silence, (int(steps[longest]), int(t_ns[longest] - steps[longest])))
         track.last_ns = int(t_ns[-1])
 
-    def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
+    def _stillness(self, track: _Track, still: _Stillness, t_ns: IntArray, data: Array) -> None:
         row = data[0] if track.row is None else track.row
         changed = np.flatnonzero((data != np.concatenate((row[None], data[:-1]))).any(axis=1)).tolist()
         since_ns, seen_ns, rows = still.same or (int(t_ns[0]), int(t_ns[0]), 0)

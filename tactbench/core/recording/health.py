@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import wrong_rate
+from tactbench.core.recording.format import Array
 from tactbench.core.recording.lag import FEWEST_ROWS, find_lag, windows
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
@@ -91,7 +92,7 @@ class _Stream:
                 digest.update(column.data)
         self.contents = [digest.digest() for digest in digests]
 
-    def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
+    def names(self, which: Array) -> tuple[str, ...]:
         """Return the names of the channels that a mask takes."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
@@ -215,7 +216,7 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
 def _channels(stream: _Stream) -> Iterator[Finding]:
     there = stream.rows - stream.missing
 
-    def finding(check: str, severity: Severity, which: npt.NDArray[Any], text: str) -> Iterator[Finding]:
+    def finding(check: str, severity: Severity, which: Array, text: str) -> Iterator[Finding]:
         names = stream.names(which)
         if names:
             yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names)
@@ -305,7 +306,7 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
             return
 
 
-def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:
+def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:
     """Return whether a column is a monotone function of another, at most `LAG` rows early or late.
 
     Parameters

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, UnwritableError
 from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
-from tactbench.core.recording.format import Annotations, Blocks, Columns
+from tactbench.core.recording.format import Annotations, Array, Blocks, Columns
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -178,7 +177,7 @@ def _extend(group: Any, columns: Columns) -> None:
             _create(group, name, values, start)
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> Any:
+def _create(group: Any, name: str, values: Array, start: int = 0) -> Any:
     """Return a new column with `values` from row `start` on; the zeros before late quality mean good samples."""
     rest = values.shape[1:]
     column = group.create_dataset(
@@ -189,7 +188,7 @@ def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> 
     return column
 
 
-def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
+def _annotate(group: Any, label: str, column: Array) -> None:
     import h5py
 
     notes = group.require_group("annotations")

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
@@ -16,7 +15,7 @@ from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
-from tactbench.core.recording.format import Annotations, Columns
+from tactbench.core.recording.format import Annotations, Array, Columns
 from tactbench.core.recording.partial import Partial, read_blocks
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
@@ -248,7 +247,7 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
     return {"data": _stored(block.data, spec), **times, **flags}
 
 
-def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
+def _stored(data: Array, spec: StreamSpec) -> Array:
     declared = np.dtype(spec.dtype)
     if declared.kind == "f" or data.dtype == declared:
         return data.astype(declared, copy=False)

@@ -12,15 +12,18 @@ from typing import Any
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.formats import extra, whole
-from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import Table, UsedColumns, nanoseconds_per
+from tactbench.core.recording.mapping.model import Bag, Column, Time
+from tactbench.core.recording.mapping.table import Table, Used, nanoseconds_per
 
 MESSAGE_TIMES = ("log_time", "publish_time")
 """Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
 
+Topic = tuple[Bag, Used, Time | None]
+"""A topic with its columns that are used, and its clock."""
 
-def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns]]) -> dict[str, Table]:
-    """Read topics of one bag in one pass; return tables by their name, for each a topic and its columns that are used.
+
+def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, Table]:
+    """Return tables by their name, of topics that are read in one pass of a bag.
 
     Raises
     ------
@@ -29,8 +32,8 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns
         mapping gives another unit for a time in nanoseconds.
     """
     values: dict[str, dict[Column, Any]] = {
-        name: {one: array("d") if used.as_float(one) else [] for one in used.columns}
-        for name, (_, used) in topics.items()
+        name: {column: array("d") if is_reading else [] for column, is_reading in used.items()}
+        for name, (_, used, _) in topics.items()
     }
     counts = dict.fromkeys(topics, 0)
     decoders: dict[int, tuple[list[str], Any]] = {}
@@ -47,26 +50,25 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns
             if kind == "Message":
                 names, decode = decoders.get(record.channel_id, ((), None))
                 for name in names:
-                    topic, used = topics[name]
-                    _take(record, decode, used, values[name], f"{shown} {topic}, message {counts[name]}")
+                    _take(record, decode, topics[name], values[name], f"{shown}, message {counts[name]} of {name}")
                     counts[name] += 1
             elif kind == "Schema":
                 schemas[record.id] = record
             elif kind == "Channel" and record.id not in decoders:
                 seen.add(record.topic)
-                names = [name for name, (topic, _) in topics.items() if topic == record.topic]
+                names = [name for name, (how, *_) in topics.items() if how.topic == record.topic]
                 decoders[record.id] = names, names and _decoder(ros, record, schemas.get(record.schema_id), shown)
     tables = {}
-    for name, (topic, used) in topics.items():
+    for name, (how, used, time) in topics.items():
+        topic = how.topic
         if not counts[name]:
             hint = f"{did_you_mean(topic, seen - {topic})}It has: {', '.join(sorted(seen))}."
             raise MappingError(f"{shown} has no message of topic {topic!r}.", hint=hint)
-        time = used.time
         if time is not None and isinstance(values[name][time.column][0], int) and nanoseconds_per(time) != 1:
             raise MappingError(
                 f"{shown} {topic}: {time.column} is in nanoseconds.", hint="Write `unit: ns` under `time`."
             )
-        tables[name] = Table(f"{shown} {topic}", used.columns, range(counts[name]), values[name], ", message ")
+        tables[name] = Table(f"{shown} {topic}", tuple(used), range(counts[name]), values[name], ", message ")
     return tables
 
 
@@ -84,16 +86,16 @@ def _decoder(ros: Any, channel: Any, schema: Any, shown: str) -> Callable[[bytes
     return found
 
 
-def _take(record: Any, decode: Any, used: UsedColumns, values: dict[Column, Any], where: str) -> None:
+def _take(record: Any, decode: Any, topic: Topic, values: dict[Column, Any], where: str) -> None:
     """Add the columns of one message to `values`."""
     column: Column | None = None
     try:
         message = decode(record.data)
-        for column in used.columns:
+        for column, is_reading in topic[1].items():
             value = getattr(record, str(column)) if column in MESSAGE_TIMES else _field(message, str(column))
-            if used.time is not None and column == used.time.column:
+            if topic[2] is not None and column == topic[2].column:
                 value = _stamp(value)
-            values[column].append(float(value) if used.as_float(column) else value)
+            values[column].append(float(value) if is_reading else value)
     except (AttributeError, KeyError, IndexError, TypeError, ValueError, struct.error) as error:
         what = "cannot be decoded" if column is None else f"has no {column!r} of the kind that the mapping expects"
         raise MappingError(

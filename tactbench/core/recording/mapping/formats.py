@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
+from tactbench.core.recording.format import Array
 from tactbench.core.recording.mapping.channels import fill
 from tactbench.core.recording.mapping.model import Arrays, Column, Xlsx
-from tactbench.core.recording.mapping.table import Table, TextTable, UsedColumns, no_column, plain
+from tactbench.core.recording.mapping.table import Table, TextTable, Used, no_column, plain
 from tactbench.core.recording.mapping.text import skipped, table_of
 
 Words = dict[str, str]
@@ -133,7 +133,7 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         yield {"index": f"{index:0{wide}d}", **words}, Table(where, tuple(columns), range(len(rows)), columns)
 
 
-def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, npt.NDArray[Any]]:
+def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]:
     """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
     with ExitStack() as stack:
         if how.format == "npy":
@@ -155,7 +155,7 @@ def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, npt.ND
         return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
 
 
-def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+def _shaped(values: Array, axes: int) -> Array:
     """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
     if axes == 1 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
@@ -201,7 +201,7 @@ def _text(value: Any) -> str:
     return value.isoformat() if isinstance(value, date | time) else plain(value)
 
 
-def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
+def read_parquet(path: Path, shown: str, used: Used) -> Table:
     """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
 
     Raises
@@ -211,7 +211,7 @@ def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
         no numbers where numbers are expected.
     """
     arrow, parquet, compute = extra("parquet", shown, "pyarrow", "pyarrow.parquet", "pyarrow.compute")
-    wanted = {part for column in map(str, used.columns) for part in (column, column.rpartition(".")[0])}
+    wanted = {part for column in map(str, used) for part in (column, column.rpartition(".")[0])}
     with whole(shown, "Parquet file", "Get it again."):
         names = parquet.read_schema(path).names
         read = parquet.read_table(path, columns=[one for one in names if one in wanted])
@@ -234,12 +234,12 @@ def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
         found |= {f"{name}.{place}": compute.list_element(column, place) for place in range(lengths[0])}
     every = (*found, *(name for name in names if name not in read.column_names))
     values: dict[Column, Any] = {}
-    for column in used.columns:
+    for column, is_reading in used.items():
         if str(column) not in found:
             raise no_column(shown, str(column), every)
         one = found[str(column)]
         try:
-            if used.as_float(column):
+            if is_reading:
                 values[column] = one.cast("float64").to_numpy(zero_copy_only=False)
             else:
                 values[column] = (one.cast("string") if arrow.types.is_timestamp(one.type) else one).to_pylist()

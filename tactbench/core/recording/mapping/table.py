@@ -26,6 +26,8 @@ _GROUPS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MARKS = ",.'’ \u00a0\u202f"
 """Marks that separate decimals and thousands in the languages of the world."""
+Used = dict[Column, bool]
+"""The columns of a table that a mapping uses, and whether each holds readings: a float64 would round times."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +121,6 @@ class TextTable(Table):
 
     row: str = ":"
     how: Tabular = field(kw_only=True)
-    trailing: bool = False
-    """Whether every line of data ended with a delimiter that the header had not."""
 
     @cached_property
     def _no_sample(self) -> frozenset[str]:
@@ -197,24 +197,6 @@ class TextTable(Table):
             words |= dict.fromkeys(odd if one == self.values[column] or 2 * len(odd) < len(self) else ())
         likely = json.dumps([*words][:12], ensure_ascii=False)
         return f"If all mean 'no sample', write `no_sample: {likely}` under `read`."
-
-
-@dataclass(frozen=True)
-class UsedColumns:
-    """The columns of a table that a mapping uses."""
-
-    numbers: tuple[Column, ...]
-    texts: tuple[Column, ...]
-    time: Time | None
-
-    @cached_property
-    def columns(self) -> tuple[Column, ...]:
-        """All columns that are used, each once."""
-        return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time.column]))))
-
-    def as_float(self, column: Column) -> bool:
-        """Return whether a column holds readings; a float64 would round times, which are kept as they are."""
-        return column in self.numbers and (self.time is None or column != self.time.column)
 
 
 def no_column(shown: str, column: Column, columns: Sequence[Column]) -> MappingError:

@@ -80,7 +80,7 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     }
     places = [number for number, _ in lines]
     values = names | dict(enumerate(columns))
-    return TextTable(shown, header or tuple(range(wide)), places, values, trailing=trailing, how=how)
+    return TextTable(shown, header or tuple(range(wide)), places, values, how=how)
 
 
 def skipped(place: int, how: Tabular) -> bool:
