@@ -226,7 +226,7 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
         shape = (len(block.data), len(spec.channels))[: 1 if one in numbers else 2]
         if np.shape(values) != shape or (one in numbers and values.dtype.kind not in "iu"):
             raise RigError(
-                f"{name} has {one} of {values.dtype} in {np.shape(values)}, where {shape} is expected.",
+                f"{name} has {one} ({values.dtype}) of shape {np.shape(values)}, where {shape} is expected.",
                 hint="A block is rows by channels, in the order of the stream's spec; times and sequence numbers are "
                 "whole numbers, one a row, never invented.",
             )

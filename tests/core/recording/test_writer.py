@@ -96,7 +96,7 @@ def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unaske
         ({"stream": "taxel"}, "'taxel'"),
         ({"data": np.zeros((ROWS, 4))}, "data"),
         ({"t_ns": None}, "'device'"),
-        ({"t_ns": np.arange(ROWS) + 0.5}, "t_ns of float64"),
+        ({"t_ns": np.arange(ROWS) + 0.5}, "t_ns .float64"),
         ({"sequence": np.arange(ROWS - 1)}, "sequence"),
         ({"quality": np.ones((ROWS, 2))}, "quality"),
         ({"data": np.full((ROWS, 3), 0.5)}, "uint16"),

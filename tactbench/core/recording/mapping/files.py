@@ -221,10 +221,10 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
         )
     files = []
     for shown in kinds[""]:
-        match = re.search(source.path, shown)
+        match = source.path.search(shown)
         if match is None:
             raise MappingError(
-                f"{shown} matches {source.files!r} but not the expression {source.path!r} (table {name!r}).",
+                f"{shown} matches {source.files!r} but not the expression {source.path.pattern!r} (table {name!r}).",
                 hint="Make the pattern narrower, or the expression wider.",
             )
         words = {word: value or "" for word, value in match.groupdict().items()}

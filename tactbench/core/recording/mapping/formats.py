@@ -6,7 +6,7 @@ import importlib
 import warnings
 import zipfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from datetime import date, time
 from pathlib import Path
 from typing import Any
@@ -135,29 +135,26 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
 
 def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]:
     """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
-    with ExitStack() as stack:
-        if how.format == "npy":
-            opened = {name: path.parent / file if file else path for name, file in names.items()}
-            return {name: np.lib.format.read_array(stack.enter_context(one.open("rb")), allow_pickle=False)
-                    for name, one in opened.items()}  # fmt: skip
-        if how.format == "mat":
-            io: Any = importlib.import_module("scipy.io")
-            there, archive = [name for name, *_ in io.whosmat(path)], io.loadmat(path, variable_names=[*names])
-        else:
-            archive = stack.enter_context(np.load(stack.enter_context(path.open("rb")), allow_pickle=False))
-            there = archive.files
-        for name in names:
-            if name not in there:
-                hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
-                raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
-        if how.format == "npz":
-            return {name: archive[name] for name in names}
-        return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
+    if how.format == "npy":
+        files = {name: path.parent / file if file else path for name, file in names.items()}
+        return {name: np.load(file, allow_pickle=False) for name, file in files.items()}
+    if how.format == "mat":
+        axes = {name: len(how.axes) if name == how.array else 1 for name in names}
+        content = importlib.import_module("scipy.io").loadmat(path)
+        found = {name: _shaped(content[name], axes.get(name, 0)) for name in content if not name.startswith("__")}
+    else:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] if name in names else None for name in archive.files}
+    for name in names:
+        if name not in found:
+            hint = f"{did_you_mean(name, found)}It has: {', '.join(sorted(found))}."
+            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+    return found
 
 
 def _shaped(values: Array, axes: int) -> Array:
     """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
-    if axes == 1 and values.ndim == 2 and 1 in values.shape:
+    if axes < 2 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))
 
@@ -220,18 +217,10 @@ def read_parquet(path: Path, shown: str, used: Used) -> Table:
     found: dict[str, Any] = {}
     for name in read.column_names:
         column = read.column(name)
-        if not any(
-            getattr(arrow.types, f"is_{kind}")(column.type) for kind in ("list", "large_list", "fixed_size_list")
-        ):
-            found[name] = column
-            continue
-        lengths = compute.list_value_length(column).unique().to_pylist()
-        if len(lengths) > 1:
-            raise MappingError(
-                f"{shown}: the lists of {name!r} have {lengths[0]} values, and {lengths[1]}.",
-                hint="Only lists of one length are read.",
-            )
-        found |= {f"{name}.{place}": compute.list_element(column, place) for place in range(lengths[0])}
+        first = column[0].as_py()
+        parts = {f"{name}.{place}": place for place in range(len(first))} if isinstance(first, list) else {}
+        with whole(shown, f"table: the lists of {name!r} differ in length", "Only lists of one length are read."):
+            found |= {part: compute.list_element(column, place) for part, place in parts.items()} or {name: column}
     every = (*found, *(name for name in names if name not in read.column_names))
     values: dict[Column, Any] = {}
     for column, is_reading in used.items():

@@ -379,7 +379,6 @@ def test_what_does_not_fit_is_refused_with_its_place(tables, text, change, says)
         ({"tables__table__read": {"format": "npy", "axes": ["recording", "recording"]}}, "axes"),
         ({"tables__table__read": {"format": "npy", "axes": ["row"], "per_recording": {"y": "y"}}}, "per_recording"),
         ({"tables__table__time__unit": "mm"}, "unit"),
-        ({"tables__table__path": "(?P<Start>.)"}, "'Start'"),
         ({"tables__table__path": "("}, "path"),
         ({"streams__force__channels__0__unit": "count"}, "unit"),
     ],
