@@ -11,12 +11,17 @@ from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import listed
-from tactbench.core.recording.mapping.bags import Topic, read_bag
 from tactbench.core.recording.mapping.channels import columns_of
-from tactbench.core.recording.mapping.formats import read_arrays, read_parquet, read_sheet, require_format
+from tactbench.core.recording.mapping.formats import (
+    Topic,
+    read_arrays,
+    read_bag,
+    read_parquet,
+    read_sheet,
+    require_format,
+)
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
-from tactbench.core.recording.mapping.table import Table, Used
-from tactbench.core.recording.mapping.text import read_text
+from tactbench.core.recording.mapping.table import Table, Used, read_text
 
 Words = dict[str, str]
 

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
-from tactbench.core.recording.mapping.bags import MESSAGE_TIMES
 from tactbench.core.recording.mapping.channels import MappedStream, no_translation
+from tactbench.core.recording.mapping.formats import MESSAGE_TIMES
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, TableSource, Time
 from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
