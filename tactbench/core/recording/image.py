@@ -33,8 +33,8 @@ def store(
     aside: Path,
     replace: bool = False,
     sync: bool = True,
-) -> str:
-    """Write a recording beside its place, read it back and rename it to `target`; return its content digest.
+) -> None:
+    """Write a recording beside its place, read it back and rename it to `target`.
 
     Of the recording, memory holds the compressed file and some chunks of each stream.
 
@@ -68,7 +68,7 @@ def store(
                     os.fsync(file.fileno())
             try:
                 with open_recording(aside) as written:
-                    digest = written.verify()
+                    written.verify()
             except FormatError as error:
                 raise UnwritableError(
                     f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
@@ -85,7 +85,6 @@ def store(
     finally:
         with suppress(OSError):
             aside.unlink(missing_ok=True)
-    return digest
 
 
 def require_free(path: Path) -> None:
@@ -103,11 +102,7 @@ def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotatio
     import h5py
 
     text = layout.meta_text(meta)
-
-    file.attrs["format"] = layout.FORMAT
-    file.attrs["format_version"] = layout.VERSION
-    file.attrs["complete"] = complete
-    file.attrs["NX_class"] = "NXroot"
+    file.attrs.update(format=layout.FORMAT, format_version=layout.VERSION, complete=complete, NX_class="NXroot")
     # Of variable length: one of fixed length would stop at 64 KiB, about forty channels.
     file.attrs.create("meta", text, dtype=h5py.string_dtype("utf-8"))
     streams = file.create_group("streams")
@@ -130,13 +125,13 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
     rows: Counter[str] = Counter()
     flagged = set()
     for stream, columns in blocks:
-        shape = columns["data"].shape
+        good = np.zeros_like(columns["data"], dtype=np.uint8)
         if "quality" in columns and stream not in flagged:  # all rows before it are good
             flagged.add(stream)
-            digest.add(f"/{stream}/quality", np.zeros((rows[stream], shape[1]), dtype=np.uint8))
-        elif stream in flagged:
-            columns = {"quality": np.zeros(shape, dtype=np.uint8), **columns}
-        rows[stream] += len(columns["data"])
+            digest.add(f"/{stream}/quality", np.zeros((rows[stream], *good.shape[1:]), dtype=np.uint8))
+        if stream in flagged:
+            columns = {"quality": good, **columns}
+        rows[stream] += len(good)
         for name, values in columns.items():
             digest.add(f"/{stream}/{name}", values)
         yield stream, columns
@@ -145,10 +140,10 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
     """Yield larger blocks, of whole chunks except for the last of a stream, so that each chunk is compressed once."""
     waiting: dict[str, list[Columns]] = {}
-    rows: dict[str, int] = {}
+    rows: Counter[str] = Counter()
     for stream, columns in blocks:
         waiting.setdefault(stream, []).append(columns)
-        rows[stream] = rows.get(stream, 0) + len(columns["data"])
+        rows[stream] += len(columns["data"])
         if rows[stream] >= layout.piece_rows(columns["data"].shape[1]):
             joined, whole = _joined(waiting[stream]), rows[stream] // layout.CHUNK_ROWS * layout.CHUNK_ROWS
             yield stream, {name: values[:whole] for name, values in joined.items()}
@@ -159,11 +154,10 @@ def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
 
 
 def _joined(blocks: list[Columns]) -> Columns:
-    joined = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0] if name != "quality"}
-    if any("quality" in block for block in blocks):
-        good = [block.get("quality", np.zeros(block["data"].shape, dtype=np.uint8)) for block in blocks]
-        joined["quality"] = np.concatenate(good)
-    return joined
+    """Return blocks as one; the rows before the first with quality are good."""
+    if "quality" in blocks[-1]:
+        blocks = [{"quality": np.zeros_like(block["data"], dtype=np.uint8)} | block for block in blocks]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[-1]}
 
 
 def _extend(group: Any, columns: Columns) -> None:

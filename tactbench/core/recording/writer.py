@@ -51,12 +51,9 @@ class RecordingWriter:
         self.meta = meta
         self._replace = replace
         self._specs = layout.specs_by_name(meta)
-        self.content_digest = ""
-        """Content digest, once the recording is complete."""
+        self._complete = False
         self._optional: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
-        self.journal: Path | None = None
-        """Journal of a recording that was not completed, once the context is left; None: there is none."""
 
     def __enter__(self) -> RecordingWriter:
         if not self._replace:
@@ -97,10 +94,10 @@ class RecordingWriter:
         journal = self._partial
         if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
-        self.content_digest = image.store(
-            self.path, self.meta, self._blocks(journal), {},
-            aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
-        )  # fmt: skip
+        aside = layout.completing_path(journal.path)
+        blocks = self._blocks(journal)
+        image.store(self.path, self.meta, blocks, {}, aside=aside, replace=self._replace, sync=self._unique)
+        self._complete = True
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
         """Yield the blocks of the journal; raises RecordingError if rows of it are lost."""
@@ -117,8 +114,7 @@ class RecordingWriter:
         """Close the journal, and remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
-        if not self.content_digest and any(journal.rows.values()) and self._unique:
-            self.journal = journal.path
+        if not self._complete and any(journal.rows.values()) and self._unique:
             found = recovery(journal.path, self.path)
             if isinstance(error, TactbenchError):
                 error.hint = f"{error.hint} {found}".strip()
@@ -170,7 +166,7 @@ class RecordingWriter:
 
 def write_recording(
     path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
-) -> RecordingMeta:
+) -> None:
     """Write a recording whose blocks are all there, and can be had again: no journal is kept of it.
 
     Parameters
@@ -200,7 +196,6 @@ def write_recording(
         image.require_free(path)
     aside = layout.completing_path(path)
     image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
-    return meta
 
 
 def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
