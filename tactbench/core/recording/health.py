@@ -105,12 +105,6 @@ class _Stream:
         there = ~missing[:, wanted].any(axis=1)
         return self.t_ns[rows][there], values[there][:, wanted]
 
-    def phrase(self, names: Sequence[str]) -> str:
-        """Return a phrase for channels: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
-        if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
-            return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
-        return listed(names)
-
 
 def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED) -> str:
     """Return names as a phrase: "t4 and t7"; of more than `most` the first half: "E1, E2, E3 … (19 channels)"."""
@@ -219,15 +213,14 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
     def finding(check: str, severity: Severity, which: Array, text: str) -> Iterator[Finding]:
         names = stream.names(which)
         if names:
-            yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names)
+            yield Finding(check, severity, f"{listed(names)} {text}", stream.name, names)
 
     dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
     yield from finding("dead", "error", dead, "without a single sample")
     yield from finding("stuck", "warning", (there > 1) & ~varies, "constant")
     saturated, places = stream.saturated > 0, np.arange(len(there))
-    for which in [saturated] if saturated.sum() > MOST_LISTED else saturated & np.eye(len(there), dtype=bool):
-        count, samples = int(stream.saturated[which].sum()), int(which.sum()) * stream.rows
-        yield from finding("saturated", "warning", which, f"saturated in {count} of {samples} samples")
+    text = f"saturated in {stream.saturated.sum()} of {saturated.sum() * stream.rows} samples"
+    yield from finding("saturated", "warning", saturated, text)
     for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
         yield from finding(
             "missing", "info", stream.missing == count, f"without a sample in {count} of {stream.rows} rows"
@@ -300,7 +293,7 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
             if lag is not None:
                 side = "behind" if lag[0] > 0 else "ahead of"
                 about = f"{1e3 * abs(lag[0]):.0f} ± {max(2e3 * lag[1], 1):.0f} ms"
-                lags.append(f"{about} {side} {reference.phrase(names)}{place}")
+                lags.append(f"{about} {side} {listed(names)}{place}")
         if lags:
             yield Finding("lag", "warning", f"{sensor.name} is {', '.join(lags)}", sensor.name, names)
             return

@@ -9,7 +9,7 @@ both), the JSON, the body. The first frame's JSON is the meta, without body; eve
 - ``[stream, [[column, type, shape], ...]]``: a block, whose body is its columns, little-endian, in that order;
 - ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body.
 
-``tactbench-partial 1``, which has blocks alone, without ``device_ns``, is read.
+``tactbench-partial 1``, which has only blocks, without ``device_ns``, is read.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Partial:
                 break
             except FileExistsError:
                 continue
-        try_lock(self._file)  # says that it is being written
+        try_lock(self._file)  # marks it as being written
         try:
             self._write(MAGIC + _frame(text.encode(), b""))
         except BaseException:

@@ -1,4 +1,4 @@
-"""Lazy reading of recordings, each from its file alone."""
+"""Lazy reading of recordings from their files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class LazyStream:
         return (self[rows] for rows in self._pieces())
 
     def times(self) -> IntArray | None:
-        """Return the times alone, (n,) nanoseconds; None where there is no clock."""
+        """Return the times, (n,) nanoseconds; None where there is no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
     def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
@@ -87,7 +87,7 @@ class Recording:
     path
         The file.
     meta
-        What the recording says about itself.
+        Description of the recording.
     complete
         False for what a crash left behind.
     version

@@ -36,7 +36,7 @@ class RecordingWriter:
     path
         Where the finished recording shall lie.
     meta
-        What it says about itself; :meth:`revise` changes it until the end.
+        Description of the recording; :meth:`revise` changes it until the end.
     replace
         Whether a file that is there is replaced, at the end and not before.
 
@@ -75,7 +75,7 @@ class RecordingWriter:
 
     @property
     def _unique(self) -> bool:
-        """Whether the recording cannot be made again, or stands for one that cannot: of emulated devices."""
+        """True if the recording cannot be made again, or is of emulated devices, which stand for real ones."""
         return not self.meta.simulated or self.meta.emulation is not None
 
     @property

@@ -48,7 +48,7 @@ def test_import_then_inspect(tables):
     told = dict(re.split("  +", line, maxsplit=1) for line in done.stdout.splitlines())
     assert (told["recordings"], told["rows"], told["files"]) == ("2", "100", "2")
     assert told["rows without a sample"] == "fz = 50"
-    assert "taxel b constant (in 2 recordings)" in done.stdout
+    assert "b constant (in 2 recordings)" in done.stdout
     assert "importing" in done.stderr
     about = json.loads(tables("inspect", "recordings/one.h5", "recordings/two.h5", "--format", "json").stdout)
     assert [one["meta"]["name"] for one in about] == ["one", "two"]

@@ -56,7 +56,7 @@ _SIGNATURES: dict[bytes, tuple[str, str, str]] = {
     b"\x93NUMPY": ("is a NumPy array", "npy", ""),
     b"\x89MCAP0": ("is an MCAP bag", "mcap", ""),
 }  # fmt: skip
-"""By its first bytes what a file is, the format that reads it, and the next step if none does."""
+"""Kind of a file by its first bytes, the format that reads it, and the next step if none does."""
 
 MESSAGE_TIMES = ("log_time", "publish_time")
 """Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
@@ -280,7 +280,7 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, T
         shown, "bag", "A recorder that was killed leaves such a bag: `mcap recover` keeps what can be read."
     )
     with damaged, path.open("rb") as opened:
-        # The records end at the bag's footer alone: a bag that was cut short has none.
+        # The records end at the bag's footer, which a bag that was cut short has not.
         for record in stream.StreamReader(opened, validate_crcs=True).records:
             kind = type(record).__name__
             if kind == "Message":

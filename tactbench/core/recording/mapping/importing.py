@@ -74,7 +74,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import has read, written and left out."""
+    """Files and columns that an import has read, written and left out."""
 
     title: str
     recordings: tuple[Imported, ...]
@@ -340,7 +340,7 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
     reference = {one.name for one in meta.reference}
     sensed, forces = [], []
     for stream, one in streams.items():
-        values = one.data if one.quality is None else np.where(one.quality, np.nan, one.data)
+        values = np.where(np.asarray(one.quality), np.nan, one.data)
         for channel, column in zip(one.spec.channels, values.T, strict=True):
             if stream not in reference:
                 sensed.append((channel.name, column))

@@ -86,7 +86,7 @@ class Arrays(Frozen):
     array: str = ""
     """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
-    """What the array's axes count, in their order; an axis that is left out has length 1. Several axes of channels are
+    """Meaning of each axis of the array, in order; an axis that is left out has length 1. Several axes of channels are
     read as one, of which the last runs fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
     """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
@@ -122,7 +122,7 @@ class Time(Frozen):
     column: Column
     unit: str
     epoch: Literal["unix", "start", "unknown"]
-    """What time zero means: `unix` is 1970-01-01 UTC, `start` the beginning of the recording."""
+    """Meaning of time zero: `unix` is 1970-01-01 UTC, `start` the beginning of the recording."""
     zone: str | None = None
     """Time zone of dates that have none of their own, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
@@ -166,7 +166,7 @@ class TableSource(Frozen):
 
 
 class Join(Frozen):
-    """How the rows of several tables belong together."""
+    """The rule by which rows of several tables belong together."""
 
     by: Literal["rows", "clock"]
     """`rows`: the rows of one number belong together. `clock`: every table keeps its own rows and its own times."""
@@ -271,7 +271,7 @@ class StreamSource(Frozen):
 
 
 class SensorDeclaration(Frozen):
-    """What the source of the tables says about the sensor."""
+    """Description of the sensor, as far as the source of the tables gives one."""
 
     name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
     """Name of the sensor; words like ``{word}`` are filled in, so that one mapping covers several devices."""
@@ -309,7 +309,7 @@ class DataSource(Frozen):
     licence: str
     citation: str
     measured: str
-    """What was measured, in one line."""
+    """The measured quantity or event, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
     """Tasks that the recordings can answer; all are run where a command names none."""
     bytes: int = Field(ge=1)
@@ -325,7 +325,7 @@ class Mapping(Frozen):
     title: str
     sensor: SensorDeclaration
     clock: Literal["device", "host", "none"]
-    """Which clock the times are from: the device's, the host's, or none."""
+    """The clock that made the times: the device's, the host's, or none."""
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
@@ -341,7 +341,7 @@ class Mapping(Frozen):
     tasks: tuple[DeclaredTask, ...] = ()
     """Tasks that the recordings can answer, beside the installed ones."""
     source: DataSource | None = None
-    """Where the files can be had; None: the mapping is for files that are there already."""
+    """Source of the files; None: the mapping is for files that are there already."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
@@ -349,7 +349,7 @@ class Mapping(Frozen):
             if stream.table not in self.tables:
                 raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
             if (self.tables[stream.table].time is None) != (self.clock == "none"):
-                raise ValueError(f"clock is {self.clock}, but with `clock: none` alone {stream.table} has no time")
+                raise ValueError(f"clock is {self.clock}, so that table {stream.table} must have a time (or none)")
         join, several = self.join, len(self.tables) > 1
         if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
             raise ValueError("several tables need `join`, by rows or by clock, and can be no arrays")

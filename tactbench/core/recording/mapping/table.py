@@ -175,7 +175,7 @@ class TextTable(Table):
             return math.inf
 
     def _hint(self, row: int, column: Column, wanted: str) -> str:
-        """Return the next step, by what the row or the spelling of the cell says of the cause."""
+        """Return the next step, by the cause that the row or the spelling of the cell shows."""
         cell = self._column(column)[row]
         columns = [self.values[place] for place in range(len(self.columns))]
         if cell in self.columns:
