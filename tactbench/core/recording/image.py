@@ -20,9 +20,6 @@ from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
-MOST_LISTED = 1000
-"""Most channels of which a stream has attributes, as an attribute of HDF5 holds 64 KiB at most; the meta has all."""
-
 
 def store(
     target: Path,
@@ -195,22 +192,15 @@ def _annotate(group: Any, label: str, column: Array) -> None:
 def _describe(group: Any, spec: StreamSpec) -> None:
     """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
-    names, units = zip(*((channel.name, channel.unit) for channel in spec.channels), strict=True)
-    attributes: dict[str, Any] = {"NX_class": "NXdata", "signal": "data"}
-    if spec.rate_hz is not None:
-        attributes["rate_hz"] = spec.rate_hz
-    if "t_ns" in columns:
-        attributes["axes"] = ["t_ns", "."]
+    group.attrs.update(NX_class="NXdata", signal="data", **({"axes": ["t_ns", "."]} if "t_ns" in columns else {}))
     for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
         columns[name].attrs["units"] = "ns"
-    columns["data"].attrs["units"] = units[0] if len({*units}) == 1 else "mixed: see channel_units"
-    if len(names) <= MOST_LISTED:
-        attributes |= {"channel_names": names, "channel_units": units}
-    group.attrs.update(attributes)
-    _attach_scales(group, columns, names)
+    units = {channel.unit for channel in spec.channels}
+    columns["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see meta"
+    _attach_scales(group, columns, [channel.name for channel in spec.channels])
 
 
-def _attach_scales(group: Any, columns: dict[str, Any], names: tuple[str, ...]) -> None:
+def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
     """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.
