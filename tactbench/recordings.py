@@ -61,7 +61,7 @@ class Recording:
 
     @cached_property
     def meta(self) -> RecordingMeta:
-        """What the recording says about itself; raises FormatError if the file is no recording."""
+        """Description of the recording; raises FormatError if the file is no recording."""
         return read_meta(self.path)
 
     @property
@@ -129,7 +129,7 @@ def library(name: str) -> Any:
 
 
 Recordings = Recording | AnyPath | Iterable[Recording | AnyPath]
-"""What functions take as recordings: those of :func:`open_recordings`, files, folders or globs, one or several."""
+"""Recordings as functions take them: those of :func:`open_recordings`, files, folders or globs, one or several."""
 
 
 def open_recordings(path_or_paths: Recordings) -> list[Recording]:

@@ -140,8 +140,8 @@ def require_forward(data: StreamData, recording: str) -> None:
         what = f"runs backwards {backward} times" if backward else "stands still"
         raise DataError(
             f"In recording {recording!r}, the time of {data.spec.name} {what}.",
-            hint="See where with `tactbench inspect`. Rows of a counter that begins at 0 again must not be sorted: "
-            "import them with `wraps_at` under `time`; sort others before they are imported.",
+            hint="See where with `tactbench inspect`. Rows of a counter that begins at 0 again are imported with "
+            "`wraps_at` under `time`; sort others before they are imported.",
         )
 
 

@@ -35,12 +35,12 @@ _SLACK_NS = 1e-3
 """A residual below minus this lies below the line; float64 holds the residuals of a stretch to 1e-5 ns [derived]."""
 
 MOST_DRIFT, JITTER_NS = 1e-2, 100_000_000
-"""By which a device's clock may be faster or slower than the host's, a hundred times more than a quartz; and by how
-much stamps of the host may be late: a slope over a short time says no more (assumed)."""
+"""Largest relative error of a device's clock, a hundred times that of a quartz, and largest delay of the host's stamps,
+which makes a slope over a short time uncertain (assumed)."""
 
 
 def wrong_rate(stream: str, drift: float, lasts_ns: int) -> str:
-    """Return what is wrong with a clock by the slope of its line over some time; empty: nothing can be told."""
+    """Return a sentence about a clock whose line over some time has a wrong slope; empty if it may be right."""
     if abs(drift) * lasts_ns / max(1.0, abs(drift)) < JITTER_NS or abs(drift) <= MOST_DRIFT:
         return ""
     return f"a second of the clock of {stream} takes {1 + drift:.4g} s of the host's: are its times nanoseconds?"

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.core.samples import Block, Quality
+from tactbench.core.recording.format import Array
+from tactbench.core.samples import Block, IntArray, Quality
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig_file import Allowed
 from tactbench.core.spec.sensor import StreamSpec
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 INCOMPLETE = "incomplete: "
 """Beginning of `excluded` in the meta of an incomplete recording."""
@@ -24,27 +21,23 @@ MOVED = 0.2
 
 
 @dataclass
-class _Track:
-    """Silence and the last row of one stream; times are nanoseconds."""
+class _Events:
+    """Events of a stream, of which only the long pauses between them are kept; times are nanoseconds."""
 
+    allowed_ns: float
+    count: int = 0
     last_ns: int | None = None
-    """Time of the last row with a number."""
-    silence: tuple[int, int] = (0, 0)
-    """Length and beginning of the longest time without one."""
-    row: npt.NDArray[Any] | None = None
-    """The last row."""
+    pauses: list[tuple[int, int]] = field(default_factory=list)
+    """Beginning and end of each pause that is longer than is allowed."""
 
-
-@dataclass
-class _Stillness:
-    """Stretch of equal rows in a stream of the force sensor, or in all streams of the sensor together."""
-
-    same: tuple[int, int, int] | None = None
-    """Times of the last change and of the last row, and the number of equal rows since."""
-    long: list[tuple[int, int, int]] = field(default_factory=list)
-    """Former stretches that were longer than is allowed."""
-    rows: int = 0
-    changes: int = 0
+    def add(self, t_ns: IntArray, until_ns: IntArray, start_ns: int) -> None:
+        """Add events, and the times until which nothing had happened; the first pause begins at `start_ns`."""
+        self.last_ns = start_ns if self.last_ns is None else self.last_ns
+        since_ns = np.concatenate(([self.last_ns], t_ns[:-1]))[: len(t_ns)]
+        long = until_ns - since_ns > self.allowed_ns
+        self.pauses += zip(since_ns[long].tolist(), until_ns[long].tolist(), strict=True)
+        self.count += len(t_ns)
+        self.last_ns = max(self.last_ns, int(t_ns.max(initial=self.last_ns)))
 
 
 class Completeness:
@@ -68,53 +61,40 @@ class Completeness:
         # An axis may stand; a force that nothing changes is none.
         self._forces = {one.name for one in reference if any(channel.kind == "force" for channel in one.channels)}
         self._rated = {stream.name for stream in (*sensor, *reference) if stream.rate_hz is not None}
-        self._tracks = {stream.name: _Track() for stream in (*sensor, *reference)}
-        of_sensor = _Stillness()  # a microphone may have nothing to say of a slow press
-        self._still = {stream.name: of_sensor for stream in sensor} | {one.name: _Stillness() for one in reference}
+        self._rows = {stream.name: _Events(1e9 * allowed.silent_s) for stream in (*sensor, *reference)}
+        of_sensor = _Events(
+            1e9 * allowed.frozen_s
+        )  # a microphone may be still in a slow press: its streams count together
+        self._changes = {stream.name: of_sensor for stream in sensor}
+        self._changes |= {stream.name: _Events(1e9 * allowed.frozen_s) for stream in reference}
+        self._row: dict[str, Array] = {}
         self._begin_ns: int | None = None
         self._end_ns = 0
         self._force: list[tuple[int, float]] = []
 
     def add(self, block: Block) -> None:
         """Add a block; one without times is ignored."""
-        track = self._tracks.get(block.stream)
-        if track is None or block.t_ns is None or not len(block.data):
+        stream, t_ns = block.stream, block.t_ns
+        if stream not in self._rows or t_ns is None or not len(t_ns):
             return
-        first, last = int(block.t_ns[0]), int(block.t_ns[-1])
-        self._begin_ns = first if self._begin_ns is None else min(self._begin_ns, first)
-        self._end_ns = max(self._end_ns, last)
+        self._begin_ns = int(t_ns[0]) if self._begin_ns is None else min(self._begin_ns, int(t_ns[0]))
+        self._end_ns = max(self._end_ns, int(t_ns[-1]))
         missing = np.isnan(block.data.astype(np.float64))
         if block.quality is not None:
             missing |= (block.quality & np.uint8(Quality.MISSING)) != 0
-        good = ~missing.all(axis=1)
-        if good.any():
-            self._silence(track, block.t_ns[good])
-            self._stillness(track, self._still[block.stream], block.t_ns[good], block.data[good])
-        names = self._reference.get(block.stream, [])
+        names = self._reference.get(stream, [])
         pressing = next((place for place, name in enumerate(names) if name in ("fz", "normal")), None)
         if pressing is not None and (~missing[:, pressing]).any():
-            self._force.append((last, float(block.data[~missing[:, pressing], pressing].mean())))
-
-    def _silence(self, track: _Track, t_ns: npt.NDArray[np.int64]) -> None:
-        before = self._begin_ns if track.last_ns is None else track.last_ns
-        steps = np.diff(t_ns, prepend=before or 0)
-        longest = int(steps.argmax())
-        track.silence = max(track.silence, (int(steps[longest]), int(t_ns[longest] - steps[longest])))
-        track.last_ns = int(t_ns[-1])
-
-    def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
-        row = data[0] if track.row is None else track.row
-        changed = np.flatnonzero((data != np.concatenate((row[None], data[:-1]))).any(axis=1)).tolist()
-        since_ns, seen_ns, rows = still.same or (int(t_ns[0]), int(t_ns[0]), 0)
-        begin = 0
-        for place in changed:
-            seen_ns = max(seen_ns, int(t_ns[place - 1])) if place else seen_ns
-            if seen_ns - since_ns > 1e9 * self._allowed.frozen_s:
-                still.long.append((since_ns, seen_ns, rows + place - begin))
-            since_ns, rows, begin = max(since_ns, int(t_ns[place])), 0, place
-        track.row, still.same = data[-1].copy(), (since_ns, max(seen_ns, int(t_ns[-1])), rows + len(data) - begin)
-        still.rows += len(data)
-        still.changes += len(changed)
+            self._force.append((int(t_ns[-1]), float(block.data[~missing[:, pressing], pressing].mean())))
+        good = ~missing.all(axis=1)
+        if good.any():
+            data, t_ns, rows = block.data[good], t_ns[good], self._rows[stream]
+            before = np.concatenate((self._row.get(stream, data[:1]), data[:-1]))
+            before_ns = np.concatenate(([t_ns[0] if rows.last_ns is None else rows.last_ns], t_ns[:-1]))
+            changed = (data != before).any(axis=1)
+            self._changes[stream].add(t_ns[changed], before_ns[changed], int(t_ns[0]))
+            rows.add(t_ns, t_ns, self._begin_ns)
+            self._row[stream] = data[-1:].copy()
 
     @property
     def seconds(self) -> float:
@@ -123,20 +103,18 @@ class Completeness:
 
     def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:
         """Return a sentence for each stream that lacks more than is allowed; `counts` are the rig's, by stream."""
-        return [text for name, track in self._tracks.items() for text in self._of(name, track, counts.get(name))]
+        return [text for name in self._rows for text in self._of(name, counts.get(name))]
 
-    def _of(self, name: str, track: _Track, counts: StreamCounts | None) -> Iterator[str]:
-        begin_ns = self._begin_ns or 0
-        last_ns = begin_ns if track.last_ns is None else track.last_ns
-        silent_ns, from_ns = max(track.silence, (self._end_ns - last_ns, last_ns))
-        if name in self._rated and silent_ns > 1e9 * self._allowed.silent_s:
-            yield f"{name}: nothing for {1e-9 * silent_ns:.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
-        still = self._still[name]
-        for from_ns, to_ns, rows in (*still.long, *([still.same] if still.same else [])):
-            if to_ns - from_ns <= 1e9 * self._allowed.frozen_s:
-                continue
-            dead = name in self._forces and self._dead(still, rows)
-            if dead or (name not in self._reference and self._pressed(from_ns, to_ns)):
+    def _of(self, name: str, counts: StreamCounts | None) -> Iterator[str]:
+        begin_ns, rows, changes = self._begin_ns or 0, self._rows[name], self._changes[name]
+        last_ns = begin_ns if rows.last_ns is None else rows.last_ns
+        silences = [*rows.pauses, (last_ns, self._end_ns)]
+        from_ns, to_ns = max(silences, key=lambda one: one[1] - one[0])
+        if name in self._rated and to_ns - from_ns > rows.allowed_ns:
+            yield f"{name}: nothing for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
+        seen_ns = max((self._rows[one].last_ns or 0 for one in self._rows if self._changes[one] is changes), default=0)
+        for from_ns, to_ns in [*changes.pauses, (seen_ns if changes.last_ns is None else changes.last_ns, seen_ns)]:
+            if to_ns - from_ns > changes.allowed_ns and self._frozen(name, from_ns, to_ns):
                 yield f"{name}: frozen for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
                 break
         if counts is not None:
@@ -144,14 +122,16 @@ class Completeness:
             if due and lost / due > 0.01 * self._allowed.lost_percent:
                 yield f"{name}: {lost} of {due} rows lost"
 
-    def _dead(self, still: _Stillness, rows: int) -> bool:
-        """Return whether so many equal `rows` of a force sensor are too many in view of its other rows."""
-        if not still.changes:
-            return any(one.changes for name, one in self._still.items() if name not in self._reference)
-        return still.changes > (still.rows - rows) / 2
-
-    def _pressed(self, from_ns: int, to_ns: int) -> bool:
-        """Return whether the force changed within a span of time."""
-        every = [value for _, value in self._force]
-        within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]
-        return bool(within) and max(within) - min(within) > MOVED * (max(every) - min(every)) > 0
+    def _frozen(self, name: str, from_ns: int, to_ns: int) -> bool:
+        """Return whether a sensor did not change while the force did, or a force sensor although it mostly does."""
+        if name not in self._reference:
+            every = [value for _, value in self._force]
+            within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]
+            return bool(within) and max(within) - min(within) > MOVED * (max(every) - min(every)) > 0
+        if name not in self._forces:
+            return False
+        changes = self._changes[name].count
+        if not changes:
+            return any(one.count for other, one in self._changes.items() if other not in self._reference)
+        others = self._rows[name].count * (1 - 1e-9 * (to_ns - from_ns) / self.seconds)
+        return changes > others / 2

@@ -161,7 +161,7 @@ def datasets() -> dict[str, DataSet]:
     Raises
     ------
     DuplicateNameError
-        If two packages bring one name.
+        If two packages have a data set of one name.
     """
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():
@@ -193,7 +193,7 @@ def mapping_called(given: str) -> Path | None:
 
 
 def mappings_of(module: str) -> list[Path]:
-    """Return the mapping files that the package of a plugin's module brings."""
+    """Return the mapping files in the package of a plugin's module."""
     folder = _folders().get(module.partition(".")[0])
     return [] if folder is None else sorted(folder.glob("*.yaml"))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -32,9 +32,10 @@ CHUNK_ROWS = 1024
 
 SEE = "See docs/format.md."
 
-Annotations = dict[str, dict[str, npt.NDArray[Any]]]
+Array = npt.NDArray[Any]
+Annotations = Mapping[str, Mapping[str, Array]]
 """Labels of rows by stream and name: (n,) texts or whole numbers."""
-Columns = dict[str, npt.NDArray[Any]]
+Columns = dict[str, Array]
 """Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
 Blocks = Iterable[tuple[str, Columns]]
 """Stream and columns of each block, in the order of arrival."""
@@ -89,7 +90,7 @@ class ContentDigest:
         """SHA-256 and number of the rows so far, by name, type and shape of a row."""
         self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
-    def add(self, name: str, values: npt.NDArray[Any]) -> None:
+    def add(self, name: str, values: Array) -> None:
         """Add rows of a column; before version 4, whole columns are added in the order of the streams."""
         if values.dtype.kind == "U":
             kind = "text"
@@ -117,11 +118,6 @@ class ContentDigest:
 def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
     """Return the streams that a recording may hold: those of the sensor and those of the reference."""
     return {stream.name: stream for stream in (*meta.sensor.streams, *meta.reference)}
-
-
-def partial_path(path: Path, attempt: int = 1) -> Path:
-    """Return the journal of an attempt to make a recording: ``x.h5.partial``, ``x.h5.2.partial`` and so on."""
-    return path.with_name(f"{path.name}{'' if attempt == 1 else f'.{attempt}'}{PARTIAL}")
 
 
 def completing_path(path: Path) -> Path:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import wrong_rate
+from tactbench.core.recording.format import Array
 from tactbench.core.recording.lag import FEWEST_ROWS, find_lag, windows
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
@@ -22,8 +23,6 @@ Severity = Literal["error", "warning", "info"]
 
 GAP = 5.0
 """A step longer than this many median steps is a gap."""
-JITTER = 0.2
-"""Steps whose 5th to 95th percentile spans more than this share of the median make a clock irregular."""
 MOST_LISTED = 6
 """Most channels that a message names one by one."""
 RATE_TOLERANCE = 0.05
@@ -42,10 +41,6 @@ GLANCE = 50
 """Rows that are compared first, as a rule that holds for all rows holds for some."""
 WRONG_UNIT = 50.0
 """Factor between the stated and the measured rate above which times are probably in a wrong unit."""
-_UNTIMED = {
-    "none": "no clock stated: rows are ordered, nothing more",
-    "nominal": "time stamps are row number by nominal rate, not measured",
-}
 FINDINGS = "findings"
 """Key of the provenance under which an import stores its findings."""
 FIELDS = ("check", "severity", "message", "stream", "channels")
@@ -97,7 +92,7 @@ class _Stream:
                 digest.update(column.data)
         self.contents = [digest.digest() for digest in digests]
 
-    def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
+    def names(self, which: Array) -> tuple[str, ...]:
         """Return the names of the channels that a mask takes."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
@@ -109,12 +104,6 @@ class _Stream:
         wanted = [one.kind == kind for one in self.spec.channels] & (2 * self.missing < self.rows)
         there = ~missing[:, wanted].any(axis=1)
         return self.t_ns[rows][there], values[there][:, wanted]
-
-    def phrase(self, names: Sequence[str]) -> str:
-        """Return a phrase for channels: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
-        if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
-            return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
-        return listed(names)
 
 
 def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED) -> str:
@@ -199,8 +188,6 @@ def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
         yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}")
-    if meta.clock in _UNTIMED:
-        yield Finding("no-clock", "info", _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
@@ -223,18 +210,17 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
 def _channels(stream: _Stream) -> Iterator[Finding]:
     there = stream.rows - stream.missing
 
-    def finding(check: str, severity: Severity, which: npt.NDArray[Any], text: str) -> Iterator[Finding]:
+    def finding(check: str, severity: Severity, which: Array, text: str) -> Iterator[Finding]:
         names = stream.names(which)
         if names:
-            yield Finding(check, severity, f"{stream.phrase(names)} {text}", stream.name, names)
+            yield Finding(check, severity, f"{listed(names)} {text}", stream.name, names)
 
     dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
     yield from finding("dead", "error", dead, "without a single sample")
     yield from finding("stuck", "warning", (there > 1) & ~varies, "constant")
     saturated, places = stream.saturated > 0, np.arange(len(there))
-    for which in [saturated] if saturated.sum() > MOST_LISTED else saturated & np.eye(len(there), dtype=bool):
-        count, samples = int(stream.saturated[which].sum()), int(which.sum()) * stream.rows
-        yield from finding("saturated", "warning", which, f"saturated in {count} of {samples} samples")
+    text = f"saturated in {stream.saturated.sum()} of {saturated.sum() * stream.rows} samples"
+    yield from finding("saturated", "warning", saturated, text)
     for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
         yield from finding(
             "missing", "info", stream.missing == count, f"without a sample in {count} of {stream.rows} rows"
@@ -276,18 +262,12 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     forward = steps[backward + doubled :]
     if len(forward) < 3:
         return
-    low, median, high = (1e-9 * float(forward[len(forward) * percent // 100]) for percent in (5, 50, 95))
+    median = 1e-9 * float(forward[len(forward) // 2])
     gaps = len(forward) - int(np.searchsorted(forward, 1e9 * GAP * median, side="right"))
     if gaps:
         text = f"{gaps} gaps in {stream}: up to {1e-9 * forward[-1]:.3g} s, where the median step is {median:.3g} s"
         yield Finding("gaps", "warning", text, stream)
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
-    if high - low > JITTER * median:
-        text = (
-            f"irregular clock in {stream}: median step {median:.3g} s, 5th to 95th percentile {low:.3g} to "
-            f"{high:.3g} s, mean rate {rate:.3g} Hz"
-        )
-        yield Finding("irregular", "info", text, stream)
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
@@ -305,22 +285,21 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
         return
     if any(len(t_ns) < FEWEST_ROWS or (t_ns[1:] < t_ns[:-1]).any() for t_ns in (own, other)):
         return
-    lags: list[tuple[str, tuple[float, float]]] = []
-    for place, window in windows(own, other).items():
-        lag = find_lag(*sensor.between("taxel", *window), *reference.between("force", *window))
-        if lag is not None:
-            ends = {" at the beginning": lag.beginning, " at the end": lag.end}
-            lags += (ends if lag.drifts and not place else {place: lag.middle}).items()
-    if lags:
-        text = ", ".join(
-            f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
-            f"{reference.phrase(reference.names(forces))}{place}"
-            for place, (late, error) in lags
-        )
-        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces))
+    names = reference.names(forces)
+    for spans in windows(own, other):
+        lags = []
+        for place, span in spans.items():
+            lag = find_lag(*sensor.between("taxel", *span), *reference.between("force", *span))
+            if lag is not None:
+                side = "behind" if lag[0] > 0 else "ahead of"
+                about = f"{1e3 * abs(lag[0]):.0f} ± {max(2e3 * lag[1], 1):.0f} ms"
+                lags.append(f"{about} {side} {listed(names)}{place}")
+        if lags:
+            yield Finding("lag", "warning", f"{sensor.name} is {', '.join(lags)}", sensor.name, names)
+            return
 
 
-def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:
+def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:
     """Return whether a column is a monotone function of another, at most `LAG` rows early or late.
 
     Parameters

@@ -10,19 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, UnwritableError
 from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
-from tactbench.core.recording.format import Annotations, Blocks, Columns
+from tactbench.core.recording.format import Annotations, Array, Blocks, Columns
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
-
-MOST_LISTED = 1000
-"""Most channels of which a stream has attributes, as an attribute of HDF5 holds 64 KiB at most; the meta has all."""
 
 
 def store(
@@ -34,8 +30,8 @@ def store(
     aside: Path,
     replace: bool = False,
     sync: bool = True,
-) -> str:
-    """Write a recording beside its place, read it back and rename it to `target`; return its content digest.
+) -> None:
+    """Write a recording beside its place, read it back and rename it to `target`.
 
     Of the recording, memory holds the compressed file and some chunks of each stream.
 
@@ -69,7 +65,7 @@ def store(
                     os.fsync(file.fileno())
             try:
                 with open_recording(aside) as written:
-                    digest = written.verify()
+                    written.verify()
             except FormatError as error:
                 raise UnwritableError(
                     f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
@@ -86,7 +82,6 @@ def store(
     finally:
         with suppress(OSError):
             aside.unlink(missing_ok=True)
-    return digest
 
 
 def require_free(path: Path) -> None:
@@ -104,11 +99,7 @@ def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotatio
     import h5py
 
     text = layout.meta_text(meta)
-
-    file.attrs["format"] = layout.FORMAT
-    file.attrs["format_version"] = layout.VERSION
-    file.attrs["complete"] = complete
-    file.attrs["NX_class"] = "NXroot"
+    file.attrs.update(format=layout.FORMAT, format_version=layout.VERSION, complete=complete, NX_class="NXroot")
     # Of variable length: one of fixed length would stop at 64 KiB, about forty channels.
     file.attrs.create("meta", text, dtype=h5py.string_dtype("utf-8"))
     streams = file.create_group("streams")
@@ -131,13 +122,13 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
     rows: Counter[str] = Counter()
     flagged = set()
     for stream, columns in blocks:
-        shape = columns["data"].shape
+        good = np.zeros_like(columns["data"], dtype=np.uint8)
         if "quality" in columns and stream not in flagged:  # all rows before it are good
             flagged.add(stream)
-            digest.add(f"/{stream}/quality", np.zeros((rows[stream], shape[1]), dtype=np.uint8))
-        elif stream in flagged:
-            columns = {"quality": np.zeros(shape, dtype=np.uint8), **columns}
-        rows[stream] += len(columns["data"])
+            digest.add(f"/{stream}/quality", np.zeros((rows[stream], *good.shape[1:]), dtype=np.uint8))
+        if stream in flagged:
+            columns = {"quality": good, **columns}
+        rows[stream] += len(good)
         for name, values in columns.items():
             digest.add(f"/{stream}/{name}", values)
         yield stream, columns
@@ -146,10 +137,10 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
     """Yield larger blocks, of whole chunks except for the last of a stream, so that each chunk is compressed once."""
     waiting: dict[str, list[Columns]] = {}
-    rows: dict[str, int] = {}
+    rows: Counter[str] = Counter()
     for stream, columns in blocks:
         waiting.setdefault(stream, []).append(columns)
-        rows[stream] = rows.get(stream, 0) + len(columns["data"])
+        rows[stream] += len(columns["data"])
         if rows[stream] >= layout.piece_rows(columns["data"].shape[1]):
             joined, whole = _joined(waiting[stream]), rows[stream] // layout.CHUNK_ROWS * layout.CHUNK_ROWS
             yield stream, {name: values[:whole] for name, values in joined.items()}
@@ -160,11 +151,10 @@ def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
 
 
 def _joined(blocks: list[Columns]) -> Columns:
-    joined = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0] if name != "quality"}
-    if any("quality" in block for block in blocks):
-        good = [block.get("quality", np.zeros(block["data"].shape, dtype=np.uint8)) for block in blocks]
-        joined["quality"] = np.concatenate(good)
-    return joined
+    """Return blocks as one; the rows before the first with quality are good."""
+    if "quality" in blocks[-1]:
+        blocks = [{"quality": np.zeros_like(block["data"], dtype=np.uint8)} | block for block in blocks]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[-1]}
 
 
 def _extend(group: Any, columns: Columns) -> None:
@@ -178,7 +168,7 @@ def _extend(group: Any, columns: Columns) -> None:
             _create(group, name, values, start)
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> Any:
+def _create(group: Any, name: str, values: Array, start: int = 0) -> Any:
     """Return a new column with `values` from row `start` on; the zeros before late quality mean good samples."""
     rest = values.shape[1:]
     column = group.create_dataset(
@@ -189,7 +179,7 @@ def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> 
     return column
 
 
-def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
+def _annotate(group: Any, label: str, column: Array) -> None:
     import h5py
 
     notes = group.require_group("annotations")
@@ -202,22 +192,15 @@ def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
 def _describe(group: Any, spec: StreamSpec) -> None:
     """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
-    names, units = zip(*((channel.name, channel.unit) for channel in spec.channels), strict=True)
-    attributes: dict[str, Any] = {"NX_class": "NXdata", "signal": "data"}
-    if spec.rate_hz is not None:
-        attributes["rate_hz"] = spec.rate_hz
-    if "t_ns" in columns:
-        attributes["axes"] = ["t_ns", "."]
+    group.attrs.update(NX_class="NXdata", signal="data", **({"axes": ["t_ns", "."]} if "t_ns" in columns else {}))
     for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
         columns[name].attrs["units"] = "ns"
-    columns["data"].attrs["units"] = units[0] if len({*units}) == 1 else "mixed: see channel_units"
-    if len(names) <= MOST_LISTED:
-        attributes |= {"channel_names": names, "channel_units": units}
-    group.attrs.update(attributes)
-    _attach_scales(group, columns, names)
+    units = {channel.unit for channel in spec.channels}
+    columns["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see meta"
+    _attach_scales(group, columns, [channel.name for channel in spec.channels])
 
 
-def _attach_scales(group: Any, columns: dict[str, Any], names: tuple[str, ...]) -> None:
+def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
     """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.

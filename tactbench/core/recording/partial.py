@@ -9,7 +9,7 @@ both), the JSON, the body. The first frame's JSON is the meta, without body; eve
 - ``[stream, [[column, type, shape], ...]]``: a block, whose body is its columns, little-endian, in that order;
 - ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body.
 
-``tactbench-partial 1``, which has blocks alone, without ``device_ns``, is read.
+``tactbench-partial 1``, which has only blocks, without ``device_ns``, is read.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, MissingRecordingError
 from tactbench.core.files import try_lock
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.format import (
+    PARTIAL,
+    Array,
     Blocks,
     Columns,
     canonical,
     completing_path,
     meta_text,
-    partial_path,
     readable,
 )
 from tactbench.core.recording.reader import Recording, parse_meta
@@ -67,8 +67,8 @@ class Partial:
         self.rows: dict[str, int] = {}
         """Number of rows of each stream that has had a block."""
         self._end = 0
-        for attempt in itertools.count(1):
-            self.path = partial_path(path, attempt)
+        for attempt in itertools.count(1):  # x.h5.partial, x.h5.2.partial and so on
+            self.path = path.with_name(f"{path.name}{'' if attempt == 1 else f'.{attempt}'}{PARTIAL}")
             try:
                 self._file = os.open(
                     self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
@@ -76,7 +76,7 @@ class Partial:
                 break
             except FileExistsError:
                 continue
-        try_lock(self._file)  # says that it is being written
+        try_lock(self._file)  # marks it as being written
         try:
             self._write(MAGIC + _frame(text.encode(), b""))
         except BaseException:
@@ -84,7 +84,7 @@ class Partial:
             self.path.unlink()
             raise
 
-    def append(self, stream: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+    def append(self, stream: str, columns: Mapping[str, Array]) -> None:
         """Add a block; once this returns, only a crash of the operating system can lose it."""
         plain = {name: np.ascontiguousarray(values, values.dtype.newbyteorder("<")) for name, values in columns.items()}
         shapes = [[name, values.dtype.str, list(values.shape)] for name, values in plain.items()]

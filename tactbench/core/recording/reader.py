@@ -1,4 +1,4 @@
-"""Lazy reading of recordings, each from its file alone."""
+"""Lazy reading of recordings from their files."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import FormatError, MissingRecordingError, UsageError, complaint
 from tactbench.core.recording import format as layout
-from tactbench.core.samples import StreamData
+from tactbench.core.recording.format import Array
+from tactbench.core.samples import IntArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -52,8 +52,8 @@ class LazyStream:
         """Yield the whole stream in order, some 16 MiB at a time."""
         return (self[rows] for rows in self._pieces())
 
-    def times(self) -> npt.NDArray[np.int64] | None:
-        """Return the times alone, (n,) nanoseconds; None where there is no clock."""
+    def times(self) -> IntArray | None:
+        """Return the times, (n,) nanoseconds; None where there is no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
     def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
@@ -66,7 +66,7 @@ class LazyStream:
         step = layout.piece_rows(len(self.spec.channels))
         return (slice(start, start + step) for start in range(0, len(self), step))
 
-    def _read(self, name: str, rows: slice) -> npt.NDArray[Any]:
+    def _read(self, name: str, rows: slice) -> Array:
         import h5py
 
         dataset = self._columns[name]
@@ -87,7 +87,7 @@ class Recording:
     path
         The file.
     meta
-        What the recording says about itself.
+        Description of the recording.
     complete
         False for what a crash left behind.
     version

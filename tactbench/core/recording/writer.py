@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
@@ -16,7 +15,7 @@ from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
-from tactbench.core.recording.format import Annotations, Columns
+from tactbench.core.recording.format import Annotations, Array, Columns
 from tactbench.core.recording.partial import Partial, read_blocks
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
@@ -37,7 +36,7 @@ class RecordingWriter:
     path
         Where the finished recording shall lie.
     meta
-        What it says about itself; :meth:`revise` changes it until the end.
+        Description of the recording; :meth:`revise` changes it until the end.
     replace
         Whether a file that is there is replaced, at the end and not before.
 
@@ -52,12 +51,9 @@ class RecordingWriter:
         self.meta = meta
         self._replace = replace
         self._specs = layout.specs_by_name(meta)
-        self.content_digest = ""
-        """Content digest, once the recording is complete."""
+        self._complete = False
         self._optional: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
-        self.journal: Path | None = None
-        """Journal of a recording that was not completed, once the context is left; None: there is none."""
 
     def __enter__(self) -> RecordingWriter:
         if not self._replace:
@@ -79,7 +75,7 @@ class RecordingWriter:
 
     @property
     def _unique(self) -> bool:
-        """Whether the recording cannot be made again, or stands for one that cannot: of emulated devices."""
+        """True if the recording cannot be made again, or is of emulated devices, which stand for real ones."""
         return not self.meta.simulated or self.meta.emulation is not None
 
     @property
@@ -98,10 +94,10 @@ class RecordingWriter:
         journal = self._partial
         if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
-        self.content_digest = image.store(
-            self.path, self.meta, self._blocks(journal), {},
-            aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
-        )  # fmt: skip
+        aside = layout.completing_path(journal.path)
+        blocks = self._blocks(journal)
+        image.store(self.path, self.meta, blocks, {}, aside=aside, replace=self._replace, sync=self._unique)
+        self._complete = True
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
         """Yield the blocks of the journal; raises RecordingError if rows of it are lost."""
@@ -118,8 +114,7 @@ class RecordingWriter:
         """Close the journal, and remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
-        if not self.content_digest and any(journal.rows.values()) and self._unique:
-            self.journal = journal.path
+        if not self._complete and any(journal.rows.values()) and self._unique:
             found = recovery(journal.path, self.path)
             if isinstance(error, TactbenchError):
                 error.hint = f"{error.hint} {found}".strip()
@@ -171,7 +166,7 @@ class RecordingWriter:
 
 def write_recording(
     path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
-) -> RecordingMeta:
+) -> None:
     """Write a recording whose blocks are all there, and can be had again: no journal is kept of it.
 
     Parameters
@@ -201,7 +196,6 @@ def write_recording(
         image.require_free(path)
     aside = layout.completing_path(path)
     image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
-    return meta
 
 
 def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
@@ -227,7 +221,7 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
         shape = (len(block.data), len(spec.channels))[: 1 if one in numbers else 2]
         if np.shape(values) != shape or (one in numbers and values.dtype.kind not in "iu"):
             raise RigError(
-                f"{name} has {one} of {values.dtype} in {np.shape(values)}, where {shape} is expected.",
+                f"{name} has {one} ({values.dtype}) of shape {np.shape(values)}, where {shape} is expected.",
                 hint="A block is rows by channels, in the order of the stream's spec; times and sequence numbers are "
                 "whole numbers, one a row, never invented.",
             )
@@ -248,7 +242,7 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
     return {"data": _stored(block.data, spec), **times, **flags}
 
 
-def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
+def _stored(data: Array, spec: StreamSpec) -> Array:
     declared = np.dtype(spec.dtype)
     if declared.kind == "f" or data.dtype == declared:
         return data.astype(declared, copy=False)

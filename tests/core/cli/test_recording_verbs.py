@@ -48,6 +48,7 @@ def test_import_then_inspect(tables):
     shown = dict(re.split("  +", line, maxsplit=1) for line in done.stdout.splitlines())
     assert (shown["recordings"], shown["rows"], shown["files"]) == ("2", "100", "2")
     assert next(value for name, value in shown.items() if name.endswith("sample")).split() == ["fz", "=", "50"]
+    assert "b constant (in 2 recordings)" in done.stdout
     assert "importing" in done.stderr
     about = json.loads(tables("inspect", "recordings/one.h5", "recordings/two.h5", "--format", "json").stdout)
     assert [one["meta"]["name"] for one in about] == ["one", "two"]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way, wrong_rate
-from tactbench.core.spec.recording import StreamClock
+from tactbench.core.spec.recording import ClockSegment, StreamClock
 from tests.conftest import ROOT
 
 MS = 1_000_000
@@ -55,6 +55,16 @@ def test_a_device_that_starts_again_and_one_that_pauses():
     # 1 ms of uniform delay over 500 points: the least are a few microseconds above the line.
     times = HostTimes(StreamClock(source="device", segments=fit.segments()))
     assert np.abs(times(device) - true).max() < 50_000
+
+
+def test_between_the_middles_of_two_lines_one_goes_over_into_the_other():
+    lines = [
+        ClockSegment(run=0, middle_ns=at, offset_ns=at // 10, drift=0.0, bound_ns=None, points=9)
+        for at in (100, 200, 400)
+    ]
+    times = HostTimes(StreamClock(source="device", segments=tuple(lines)))
+    device = np.array([0, 100, 150, 200, 250, 400, 500])
+    assert (times(device) - device).tolist() == [10, 10, 15, 20, 25, 40, 40]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """A recording that lacks more than is allowed says so: silence, rows lost, and readings that stand still."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,13 @@ from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 TAXELS = StreamSpec(name="taxels", rate_hz=100.0, channels=tuple(ChannelSpec(name=f"t{n}", kind="taxel") for n in "12"))
 FORCE = StreamSpec(name="force", rate_hz=100.0, channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
-SECONDS, HZ = 10, 100
+SECONDS, HZ, START_NS = 10, 100, 5_000_000_000
+
+
+def facts(found, counts=None):
+    """Return stream, first word and numbers of each sentence."""
+    cut = (text.split(": ") for text in found.lacking(counts or {}))
+    return [(name, rest.split()[0], *map(float, re.findall(r"[\d.]+", rest))) for name, rest in cut]
 
 
 def lacking(taxels=None, force=None, counts=None, keep=lambda t_s: True, **allowed):
@@ -22,10 +30,10 @@ def lacking(taxels=None, force=None, counts=None, keep=lambda t_s: True, **allow
     forces = noise[:, 2:] * 0.01 + t_s[:, None] if force is None else force(t_s)
     found = Completeness(Allowed(**allowed), (TAXELS,), (FORCE,))
     for rows in np.arange(len(t_s)).reshape(-1, 10):
-        found.add(Block("taxels", (1e9 * t_s[rows]).astype(np.int64), sensed[rows]))
+        found.add(Block("taxels", START_NS + (1e9 * t_s[rows]).astype(np.int64), sensed[rows]))
         rows = rows[[keep(at) for at in t_s[rows]]]
-        found.add(Block("force", (1e9 * t_s[rows]).astype(np.int64), forces[rows]))
-    return found.lacking(counts or {})
+        found.add(Block("force", START_NS + (1e9 * t_s[rows]).astype(np.int64), forces[rows]))
+    return facts(found, counts)
 
 
 def test_a_whole_recording_lacks_nothing():
@@ -33,15 +41,15 @@ def test_a_whole_recording_lacks_nothing():
 
 
 @pytest.mark.parametrize(
-    ("keep", "says"),
+    ("keep", "span"),
     [
-        (lambda t_s: t_s < 3.0, "nothing for 7 s from 2.99 s on"),  # it ended
-        (lambda t_s: not 3.0 <= t_s < 6.0, "nothing for 3.01 s from 2.99 s on"),  # it came back
-        (lambda t_s: t_s >= 3.0, "nothing for 3 s from 0 s on"),  # it began late
+        (lambda t_s: t_s < 3.0, (7, 2.99)),  # it ended
+        (lambda t_s: not 3.0 <= t_s < 6.0, (3.01, 2.99)),  # it came back
+        (lambda t_s: t_s >= 3.0, (3, 0)),  # it began late
     ],
 )
-def test_silence_is_missing(keep, says):
-    assert lacking(keep=keep) == [f"force: {says}"]
+def test_silence_is_missing(keep, span):
+    assert lacking(keep=keep) == [("force", "nothing", *span)]
     assert lacking(keep=keep, silent_s=7.5) == []
 
 
@@ -49,14 +57,14 @@ def test_rows_without_a_number_or_marked_missing_are_silence():
     found, row = Completeness(Allowed(), (), (FORCE,)), np.arange(100)[:, None]
     quality = Quality.MISSING * (row > 50).astype(np.uint8) * (row < 75)
     found.add(Block("force", row[:, 0] * 10**8, np.where(row < 75, row, np.nan), quality))
-    assert found.lacking({}) == ["force: nothing for 4.9 s from 5 s on"]
+    assert facts(found) == [("force", "nothing", 4.9, 5)]
 
 
 def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_meanwhile():
     stuck = lambda t_s: np.where(t_s < 4.0, t_s, 4.0)[:, None]  # noqa: E731
-    assert lacking(force=stuck) == ["force: frozen for 5.99 s from 4 s on"]
+    assert lacking(force=stuck) == [("force", "frozen", 5.99, 4)]
     still = lambda t_s: np.full((len(t_s), 2), 7.0)  # noqa: E731
-    assert lacking(taxels=still) == ["taxels: frozen for 9.99 s from 0 s on"]
+    assert lacking(taxels=still) == [("taxels", "frozen", 9.99, 0)]
     # A second stream of the sensor that changes shows that the sensor lives, whatever the first one does.
     sound = StreamSpec(name="sound", rate_hz=100.0, channels=(ChannelSpec(name="pac", kind="ac_pressure"),))
     found = Completeness(Allowed(), (TAXELS, sound), (FORCE,))
@@ -71,12 +79,12 @@ def test_a_force_of_coarse_steps_may_stand_still_without_load_and_one_that_never
     assert lacking(force=coarse, frozen_s=1.0) == []
     noisy = np.random.default_rng(2).normal(size=(SECONDS * HZ, 1))
     hung = lambda t_s: np.where((t_s[:, None] >= 4.0) & (t_s[:, None] < 7.0), 4.0, noisy)  # noqa: E731
-    assert lacking(force=hung) == ["force: frozen for 2.99 s from 4 s on"]
+    assert lacking(force=hung) == [("force", "frozen", 2.99, 4)]
     dead = lambda t_s: np.zeros((len(t_s), 1))  # noqa: E731
-    assert lacking(force=dead) == ["force: frozen for 9.99 s from 0 s on"]
+    assert lacking(force=dead) == [("force", "frozen", 9.99, 0)]
 
 
 def test_rows_lost_are_missing_beyond_the_percentage_that_is_allowed():
     counts = {"force": StreamCounts(received=970, written=960, dropped=10, gaps=30)}
-    assert lacking(counts=counts) == ["force: 40 of 1000 rows lost"]
+    assert lacking(counts=counts) == [("force", "40", 40, 1000)]
     assert lacking(counts=counts, lost_percent=4.0) == []

@@ -31,7 +31,7 @@ def kept(version, digest):
 def test_versions_from_2_on(version, digest):
     meta, taxels, _ = kept(version, digest)
     n = np.arange(180)
-    assert (meta.emulation.time, meta.counts) == ("real", {"pad parity errors": 1})
+    assert (meta.emulation.time, [*meta.counts.values()]) == ("real", [1])
     clock = meta.clocks["taxels"]
     assert (clock.delay_ns, clock.wraps, clock.breaks) == ((200_000, 300_000), 1, 1)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)

@@ -1,7 +1,6 @@
 """A recording holds what was handed in, or there is none: interrupted at any write, or on a disk that drops some."""
 
 import gc
-import os
 import shutil
 import sys
 from functools import partial
@@ -20,7 +19,7 @@ from tactbench.core.samples import Block, Quality
 from tactbench.rigs.replay import RecordingFolder
 from tests.core.recording.conftest import about
 
-ROWS = np.arange(2000)
+ROWS = np.arange(1200)
 WRITES = {"write", "flush", "truncate", "fsync", "replace", "close", "__setitem__", "resize", "create_dataset"}
 DATA = ROWS[:, None] % 4093 + np.arange(3)
 MAPPING = """
@@ -40,9 +39,9 @@ streams:
 
 def record(folder):
     with RecordingWriter(folder / "press.h5", about()) as writer:
-        for first in range(0, len(ROWS), 1000):
-            rows = slice(first, first + 1000)
-            flags = np.full((1000, 3), Quality.SUSPECT, dtype=np.uint8) if first else None
+        for first in range(0, len(ROWS), 600):
+            rows = slice(first, first + 600)
+            flags = np.full((600, 3), Quality.SUSPECT, dtype=np.uint8) if first else None
             writer.append(Block("taxels", ROWS[rows] * 1000, DATA[rows], flags))
 
 
@@ -68,16 +67,16 @@ def scene(tmp_path):
 
 
 def interrupt_at(place, write):
-    """Carry out `write`, and raise KeyboardInterrupt at a call of a function that writes; return their number."""
-    calls = 0
+    """Carry out `write`, and raise KeyboardInterrupt at a call of a function that writes; return the places of all."""
+    calls = []
 
     def count(frame, event, called):
-        nonlocal calls
         name = frame.f_code.co_name if event == "call" else called.__name__ if event == "c_call" else ""
-        calls += name in WRITES
-        if calls == place:
-            sys.setprofile(None)
-            raise KeyboardInterrupt
+        if name in WRITES and not frame.f_code.co_filename.endswith("weakref.py"):
+            calls.append((name, frame.f_code, frame.f_lineno))
+            if len(calls) == place:
+                sys.setprofile(None)
+                raise KeyboardInterrupt
 
     sys.setprofile(count)
     try:
@@ -90,9 +89,11 @@ def interrupt_at(place, write):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # in a destructor it is only printed
 @pytest.mark.parametrize("write", [record, rescued, imported])
 def test_an_interrupt_at_any_write_leaves_the_right_file_or_none(scene, write):
-    calls = interrupt_at(-1, partial(write, scene))
-    assert calls > 20
-    for place in range(1, min(calls, 100) + 1):
+    """Each line that writes is interrupted when it runs first and when it runs last."""
+    calls = list(enumerate(interrupt_at(-1, partial(write, scene)), 1))
+    places = {*{call: place for place, call in calls}.values(), *{call: place for place, call in calls[::-1]}.values()}
+    assert len(places) > 10
+    for place in sorted(places):
         shutil.rmtree(scene)
         scene.mkdir()
         try:
@@ -133,27 +134,13 @@ def test_rows_that_are_not_written_are_found_when_they_are_read_back(scene, monk
     assert not (scene / "press.h5").exists()
 
 
-def test_a_block_that_the_disk_drops_is_missed(scene, monkeypatch):
-    count, write = 0, os.write
-
-    def drop(file, content):
-        nonlocal count
-        count += 1
-        return len(content) if count == 3 else write(file, content)
-
-    monkeypatch.setattr(os, "write", drop)
-    with pytest.raises(RecordingError, match="lost rows"):
-        record(scene)
-    assert not (scene / "press.h5").exists()
-
-
 def test_the_next_import_ends_what_an_import_that_was_killed_has_begun(scene):
     imported(scene)
     replay = RecordingFolder(scene)
     for name in (".importing-a", ".placing-b"):
         (scene / name).mkdir()
         shutil.copyfile(scene / "press.h5", scene / name / f"{name[1:-2]}.h5")
-    with pytest.raises(MissingRecordingError, match="some are missing"):
+    with pytest.raises(MissingRecordingError, match="interrupted"):
         replay.recordings()
     with (scene / ".importing-a" / ".lock").open("w") as lock:
         assert try_lock(lock.fileno())

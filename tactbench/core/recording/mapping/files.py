@@ -11,12 +11,17 @@ from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import listed
-from tactbench.core.recording.mapping.bags import read_bag
 from tactbench.core.recording.mapping.channels import columns_of
-from tactbench.core.recording.mapping.formats import read_arrays, read_parquet, read_sheet, require_format
+from tactbench.core.recording.mapping.formats import (
+    Topic,
+    read_arrays,
+    read_bag,
+    read_parquet,
+    read_sheet,
+    require_format,
+)
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
-from tactbench.core.recording.mapping.table import Table, UsedColumns
-from tactbench.core.recording.mapping.text import read_text
+from tactbench.core.recording.mapping.table import Table, Used, read_text
 
 Words = dict[str, str]
 
@@ -107,7 +112,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
     """Yield the recordings of files that belong together: one, or those of an array or of the values of a column."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
     tables: dict[str, Table] = {}
-    topics: dict[FoundFile, dict[str, tuple[str, UsedColumns]]] = {}
+    topics: dict[FoundFile, dict[str, Topic]] = {}
     for name, file in files.files.items():
         how, used = mapping.tables[name].read, used_columns(mapping, name)
         require_format(file.path, file.shown, how.format)
@@ -116,7 +121,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
                 yield RawRecording({name: array}, {**files.words, **words}, shown)
             return
         if isinstance(how, Bag):
-            topics.setdefault(file, {})[name] = how.topic, used
+            topics.setdefault(file, {})[name] = how, used, mapping.tables[name].time
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         elif isinstance(how, Parquet):
@@ -150,14 +155,14 @@ class Shape(NamedTuple):
     shown: str
     columns: tuple[Column, ...]
     everywhere: dict[Column, None]
-    used: tuple[Column, ...]
+    used: Used
 
 
 def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Shape]) -> None:
     """Raise MappingError if a table has other columns than the first file where the mapping names places."""
     for name, table in raw.tables.items():
         if name not in shapes:
-            shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name).columns)
+            shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name))
         first = shapes[name]
         first.everywhere.update(dict.fromkeys(table.columns))
         by_place = {one for one in first.used if isinstance(one, int)}
@@ -177,13 +182,13 @@ def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
             yield f"{len(left)} of {len(columns)} columns of table {name}: {listed(left, 'columns', 12)}"
 
 
-def used_columns(mapping: Mapping, name: str) -> UsedColumns:
-    """Return which columns of a table the mapping uses."""
-    streams = [stream for stream in mapping.streams.values() if stream.table == name]
+def used_columns(mapping: Mapping, name: str) -> Used:
+    """Return the columns of a table that the mapping uses."""
+    streams, time = [one for one in mapping.streams.values() if one.table == name], mapping.tables[name].time
     numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
     texts = [note.column for one in streams for note in one.annotations.values() if note.column is not None]
     texts += mapping.split_by.values() if name == next(iter(mapping.tables)) else ()
-    return UsedColumns(tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), mapping.tables[name].time)
+    return dict.fromkeys(texts, False) | dict.fromkeys(numbers, True) | ({time.column: False} if time else {})
 
 
 def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFile], dict[str, str]]:
@@ -221,10 +226,10 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
         )
     files = []
     for shown in kinds[""]:
-        match = re.search(source.path, shown)
+        match = source.path.search(shown)
         if match is None:
             raise MappingError(
-                f"{shown} matches {source.files!r} but not the expression {source.path!r} (table {name!r}).",
+                f"{shown} matches {source.files!r} but not the expression {source.path.pattern!r} (table {name!r}).",
                 hint="Make the pattern narrower, or the expression wider.",
             )
         words = {word: value or "" for word, value in match.groupdict().items()}

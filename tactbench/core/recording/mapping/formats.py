@@ -1,24 +1,36 @@
-"""Recognition of a file's format, and the readers of NumPy arrays, MATLAB files, Excel workbooks and Parquet files."""
+"""Recognition of a file's format; readers of arrays, Excel workbooks, Parquet files and MCAP bags (ROS 2, Foxglove)."""
 
 from __future__ import annotations
 
 import importlib
+import json
+import struct
 import warnings
 import zipfile
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from datetime import date, time
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
+from tactbench.core.recording.format import Array
 from tactbench.core.recording.mapping.channels import fill
-from tactbench.core.recording.mapping.model import Arrays, Column, Xlsx
-from tactbench.core.recording.mapping.table import Table, TextTable, UsedColumns, no_column, plain
-from tactbench.core.recording.mapping.text import skipped, table_of
+from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Time, Xlsx
+from tactbench.core.recording.mapping.table import (
+    Table,
+    TextTable,
+    Used,
+    nanoseconds_per,
+    no_column,
+    plain,
+    skipped,
+    table_of,
+)
 
 Words = dict[str, str]
 
@@ -44,7 +56,13 @@ _SIGNATURES: dict[bytes, tuple[str, str, str]] = {
     b"\x93NUMPY": ("is a NumPy array", "npy", ""),
     b"\x89MCAP0": ("is an MCAP bag", "mcap", ""),
 }  # fmt: skip
-"""By its first bytes what a file is, the format that reads it, and the next step if none does."""
+"""Kind of a file by its first bytes, the format that reads it, and the next step if none does."""
+
+MESSAGE_TIMES = ("log_time", "publish_time")
+"""Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
+
+Topic = tuple[Bag, Used, Time | None]
+"""A topic with its columns that are used, and its clock."""
 
 
 def require_format(path: Path, shown: str, wanted: str) -> None:
@@ -133,31 +151,30 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         yield {"index": f"{index:0{wide}d}", **words}, Table(where, tuple(columns), range(len(rows)), columns)
 
 
-def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, npt.NDArray[Any]]:
+def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]:
     """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
-    with ExitStack() as stack:
-        if how.format == "npy":
-            opened = {name: path.parent / file if file else path for name, file in names.items()}
-            return {name: np.lib.format.read_array(stack.enter_context(one.open("rb")), allow_pickle=False)
-                    for name, one in opened.items()}  # fmt: skip
-        if how.format == "mat":
-            io: Any = importlib.import_module("scipy.io")
-            there, archive = [name for name, *_ in io.whosmat(path)], io.loadmat(path, variable_names=[*names])
-        else:
-            archive = stack.enter_context(np.load(stack.enter_context(path.open("rb")), allow_pickle=False))
-            there = archive.files
-        for name in names:
-            if name not in there:
-                hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
-                raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
-        if how.format == "npz":
-            return {name: archive[name] for name in names}
-        return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
+    if how.format == "npy":
+        files = {name: path.parent / file if file else path for name, file in names.items()}
+        return {name: np.load(file, allow_pickle=False) for name, file in files.items()}
+    if how.format == "mat":
+        axes = {name: len(how.axes) if name == how.array else 1 for name in names}
+        content = importlib.import_module("scipy.io").loadmat(path)
+        found: dict[str, Any] = {
+            name: _shaped(content[name], axes.get(name, 0)) for name in content if not name.startswith("__")
+        }
+    else:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] if name in names else None for name in archive.files}
+    for name in names:
+        if name not in found:
+            hint = f"{did_you_mean(name, found)}It has: {', '.join(sorted(found))}."
+            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+    return found
 
 
-def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+def _shaped(values: Array, axes: int) -> Array:
     """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
-    if axes == 1 and values.ndim == 2 and 1 in values.shape:
+    if axes < 2 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))
 
@@ -201,7 +218,7 @@ def _text(value: Any) -> str:
     return value.isoformat() if isinstance(value, date | time) else plain(value)
 
 
-def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
+def read_parquet(path: Path, shown: str, used: Used) -> Table:
     """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
 
     Raises
@@ -211,7 +228,7 @@ def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
         no numbers where numbers are expected.
     """
     arrow, parquet, compute = extra("parquet", shown, "pyarrow", "pyarrow.parquet", "pyarrow.compute")
-    wanted = {part for column in map(str, used.columns) for part in (column, column.rpartition(".")[0])}
+    wanted = {part for column in map(str, used) for part in (column, column.rpartition(".")[0])}
     with whole(shown, "Parquet file", "Get it again."):
         names = parquet.read_schema(path).names
         read = parquet.read_table(path, columns=[one for one in names if one in wanted])
@@ -220,26 +237,18 @@ def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
     found: dict[str, Any] = {}
     for name in read.column_names:
         column = read.column(name)
-        if not any(
-            getattr(arrow.types, f"is_{kind}")(column.type) for kind in ("list", "large_list", "fixed_size_list")
-        ):
-            found[name] = column
-            continue
-        lengths = compute.list_value_length(column).unique().to_pylist()
-        if len(lengths) > 1:
-            raise MappingError(
-                f"{shown}: the lists of {name!r} have {lengths[0]} values, and {lengths[1]}.",
-                hint="Only lists of one length are read.",
-            )
-        found |= {f"{name}.{place}": compute.list_element(column, place) for place in range(lengths[0])}
+        first = column[0].as_py()
+        parts = {f"{name}.{place}": place for place in range(len(first))} if isinstance(first, list) else {}
+        with whole(shown, f"table: the lists of {name!r} differ in length", "Only lists of one length are read."):
+            found |= {part: compute.list_element(column, place) for part, place in parts.items()} or {name: column}
     every = (*found, *(name for name in names if name not in read.column_names))
     values: dict[Column, Any] = {}
-    for column in used.columns:
+    for column, is_reading in used.items():
         if str(column) not in found:
             raise no_column(shown, str(column), every)
         one = found[str(column)]
         try:
-            if used.as_float(column):
+            if is_reading:
                 values[column] = one.cast("float64").to_numpy(zero_copy_only=False)
             else:
                 values[column] = (one.cast("string") if arrow.types.is_timestamp(one.type) else one).to_pylist()
@@ -247,3 +256,103 @@ def read_parquet(path: Path, shown: str, used: UsedColumns) -> Table:
             hint = f"Name another column; {error}."
             raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
     return Table(shown, every, range(read.num_rows), values)
+
+
+def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, Table]:
+    """Return tables by their name, of topics that are read in one pass of a bag.
+
+    Raises
+    ------
+    MappingError
+        If the extra is missing, the bag is damaged or cut short or has no such topic, messages lack a field, or the
+        mapping gives another unit for a time in nanoseconds.
+    """
+    values: dict[str, dict[Column, Any]] = {
+        name: {column: array("d") if is_reading else [] for column, is_reading in used.items()}
+        for name, (_, used, _) in topics.items()
+    }
+    counts = dict.fromkeys(topics, 0)
+    decoders: dict[int, tuple[list[str], Any]] = {}
+    schemas: dict[int, Any] = {}
+    seen: set[str] = set()
+    stream, ros = extra("mcap", shown, "mcap.stream_reader", "mcap_ros2.decoder")
+    damaged = whole(
+        shown, "bag", "A recorder that was killed leaves such a bag: `mcap recover` keeps what can be read."
+    )
+    with damaged, path.open("rb") as opened:
+        # The records end at the bag's footer, which a bag that was cut short has not.
+        for record in stream.StreamReader(opened, validate_crcs=True).records:
+            kind = type(record).__name__
+            if kind == "Message":
+                names, decode = decoders.get(record.channel_id, ((), None))
+                for name in names:
+                    _take(record, decode, topics[name], values[name], f"{shown}, message {counts[name]} of {name}")
+                    counts[name] += 1
+            elif kind == "Schema":
+                schemas[record.id] = record
+            elif kind == "Channel" and record.id not in decoders:
+                seen.add(record.topic)
+                names = [name for name, (how, *_) in topics.items() if how.topic == record.topic]
+                decoders[record.id] = names, names and _decoder(ros, record, schemas.get(record.schema_id), shown)
+    tables = {}
+    for name, (how, used, clock) in topics.items():
+        topic = how.topic
+        if not counts[name]:
+            hint = f"{did_you_mean(topic, seen - {topic})}It has: {', '.join(sorted(seen))}."
+            raise MappingError(f"{shown} has no message of topic {topic!r}.", hint=hint)
+        if clock is not None and isinstance(values[name][clock.column][0], int) and nanoseconds_per(clock) != 1:
+            raise MappingError(
+                f"{shown} {topic}: {clock.column} is in nanoseconds.", hint="Write `unit: ns` under `time`."
+            )
+        tables[name] = Table(f"{shown} {topic}", tuple(used), range(counts[name]), values[name], ", message ")
+    return tables
+
+
+def _decoder(ros: Any, channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
+    """Return the decoder of a topic's messages; raises MappingError for an encoding that cannot be read."""
+    if channel.message_encoding == "json":
+        return json.loads
+    found: Callable[[bytes], Any] | None = ros.DecoderFactory().decoder_for(channel.message_encoding, schema)
+    if found is None:
+        raise MappingError(
+            f"{shown}: topic {channel.topic!r} is encoded as {channel.message_encoding} "
+            f"({schema.encoding if schema else 'no schema'}).",
+            hint="ROS 2 messages (cdr, ros2msg) and JSON are read; `rosbags-convert` makes ROS 2 of ROS 1.",
+        )
+    return found
+
+
+def _take(record: Any, decode: Any, topic: Topic, values: dict[Column, Any], where: str) -> None:
+    """Add the columns of one message to `values`."""
+    column: Column | None = None
+    try:
+        message = decode(record.data)
+        for column, is_reading in topic[1].items():
+            value = getattr(record, str(column)) if column in MESSAGE_TIMES else _field(message, str(column))
+            if topic[2] is not None and column == topic[2].column:
+                value = _stamp(value)
+            values[column].append(float(value) if is_reading else value)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+        what = "cannot be decoded" if column is None else f"has no {column!r} of the kind that the mapping expects"
+        raise MappingError(
+            f"{where} {what} ({type(error).__name__}: {error}).",
+            hint="Fields are named by their path: header.stamp, wrench.force.z, data.0; or log_time.",
+        ) from error
+
+
+def _field(message: Any, path: str) -> Any:
+    """Return the value at a path like ``data.0``: of fields of ROS 2 messages, keys of JSON and places in arrays."""
+    for part in path.split("."):
+        if part.isdecimal():
+            message = message[int(part)]
+        else:
+            message = message[part] if isinstance(message, dict) else getattr(message, part)
+    return message
+
+
+def _stamp(value: Any) -> Any:
+    """Return a stamp in whole nanoseconds, `builtin_interfaces/Time` in either spelling, or the number that it is."""
+    if isinstance(value, int | float):
+        return value if isinstance(value, float) else Decimal(value)
+    fields = value if isinstance(value, dict) else {name: getattr(value, name) for name in value.__slots__}
+    return int(fields["sec"]) * 10**9 + int(fields["nanosec"] if "nanosec" in fields else fields["nsec"])

@@ -1,4 +1,4 @@
-"""The import of all recordings that a mapping describes; if one of them fails, none is kept."""
+"""The import of all recordings that a mapping describes, of which none is kept if one fails; and of a device's log."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Mapping as AnyMapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from dataclasses import replace as replaced
@@ -14,25 +15,37 @@ from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any
 
 import numpy as np
 import yaml
 from pydantic import ValidationError
 
-from tactbench.core.errors import MappingError, RecordingError, complaint
+from tactbench.core.errors import (
+    DataError,
+    LinkError,
+    MappingError,
+    MissingRecordingError,
+    RecordingError,
+    UsageError,
+    complaint,
+)
 from tactbench.core.files import try_lock, writable
+from tactbench.core.plugins.interfaces import DeviceLog
+from tactbench.core.plugins.registry import load_object
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, fill, no_translation, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import compare_clocks, samples, times, translations
-from tactbench.core.recording.mapping.table import TextTable
-from tactbench.core.recording.reader import UnwrittenRecording, content_digest
+from tactbench.core.recording.reader import UnwrittenRecording, content_digest, open_recording
 from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
+from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
@@ -61,16 +74,16 @@ class Imported:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import has read, written and left out."""
+    """Files and columns that an import has read, written and left out."""
 
     title: str
     recordings: tuple[Imported, ...]
     files_read: int
-    tasks: tuple[str, ...]
+    tasks: tuple[str, ...] = ()
     """Names of the tasks that the mapping declares."""
-    left_out: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
     """A sentence for each kind of files that match a pattern and make no recording."""
-    unused: tuple[str, ...]
+    unused: tuple[str, ...] = ()
     """A sentence for each kind of matches that are no tables, and one for the columns of a table that are not used."""
 
     @property
@@ -149,6 +162,75 @@ def import_tables(
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for one in sets for file in one.files.values()}
     return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
+
+
+def import_log(
+    log: Path,
+    sensor: SensorDescriptor,
+    options: AnyMapping[str, Any],
+    *,
+    out: Path,
+    session: str,
+    role: Role | None,
+    labels: AnyMapping[str, Scalar],
+    replace: bool,
+) -> ImportReport:
+    """Convert a log of a sensor's own tools into a recording, which is written whole or not at all.
+
+    Parameters
+    ----------
+    log
+        The file, of a format that the sensor's reader knows.
+    options
+        For the reader, by its own names.
+    out
+        The recording.
+    session, role, labels
+        As of :class:`~tactbench.core.spec.recording.RecordingMeta`.
+    replace
+        Replace what `out` holds.
+
+    Raises
+    ------
+    MissingRecordingError
+        If there is no such log.
+    UsageError
+        If the sensor has no reader for logs, the file is no such log, an option is not known, or `out` is no name for a
+        recording.
+    RecordingError
+        If `out` exists or cannot be written.
+    """
+    if sensor.log_reader is None:
+        raise UsageError(
+            f"The sensor {sensor.name!r} has no reader for logs.",
+            hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
+        )
+    if not log.is_file():
+        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
+    if out.suffix != ENDING:
+        raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
+    try:
+        found: DeviceLog = load_object(sensor.log_reader)(log, options)
+    except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
+        raise UsageError(error.message, hint=error.hint) from error
+    began = (f"The log says that it began {found.started}.",) if found.started else ()
+    meta = RecordingMeta(
+        name=out.stem,
+        sensor=sensor.spec.model_copy(update={"streams": found.streams}),
+        rig=RIG,
+        clock=found.clock,
+        session=session,
+        role=role,
+        labels=dict(labels),
+        remarks=(*found.remarks, *began),
+        origin=log.name,
+        counts=dict(found.counts),
+    )
+    write_recording(out, meta, found.blocks, {}, replace=replace)
+    with open_recording(out) as written:
+        rows = max(len(written.stream(name)) for name in written.stream_names)
+        made = Imported(out, written.meta, rows, {}, tuple(examine(written)))
+    return ImportReport(sensor.spec.title, (made,), 1)
 
 
 def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **about: object) -> list[Path]:
@@ -237,10 +319,6 @@ def _write(
         written[name], doubtful = samples(stream, raw.tables[stream.source.table], clocks.get(stream.source.table))
         found += doubtful
     found += _given_away(meta, written)
-    for name, table in raw.tables.items():
-        if isinstance(table, TextTable) and table.trailing:
-            text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            found.append(Finding("trailing-delimiter", "info", text))
     findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
     missing = {
         channel.name: int(lacking)
@@ -262,7 +340,7 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
     reference = {one.name for one in meta.reference}
     sensed, forces = [], []
     for stream, one in streams.items():
-        values = one.data if one.quality is None else np.where(one.quality, np.nan, one.data)
+        values = np.where(np.asarray(one.quality), np.nan, one.data)
         for channel, column in zip(one.spec.channels, values.T, strict=True):
             if stream not in reference:
                 sensed.append((channel.name, column))

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -86,7 +86,7 @@ class Arrays(Frozen):
     array: str = ""
     """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
-    """What the array's axes count, in their order; an axis that is left out has length 1. Several axes of channels are
+    """Meaning of each axis of the array, in order; an axis that is left out has length 1. Several axes of channels are
     read as one, of which the last runs fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
     """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
@@ -122,7 +122,7 @@ class Time(Frozen):
     column: Column
     unit: str
     epoch: Literal["unix", "start", "unknown"]
-    """What time zero means: `unix` is 1970-01-01 UTC, `start` the beginning of the recording."""
+    """Meaning of time zero: `unix` is 1970-01-01 UTC, `start` the beginning of the recording."""
     zone: str | None = None
     """Time zone of dates that have none of their own, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
@@ -152,7 +152,7 @@ class TableSource(Frozen):
 
     files: str
     """Pattern of their paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
-    path: str = ""
+    path: re.Pattern[str] = re.compile("")
     """Regular expression that is searched for in each path; its named groups become words."""
     read: Annotated[Csv | Text | Records | Xlsx | Arrays | Bag | Parquet, Field(discriminator="format")]
     time: Time | None = None
@@ -164,21 +164,9 @@ class TableSource(Frozen):
             raise ValueError("a pattern of files stays below the root folder: it begins with no / and has no ..")
         return files
 
-    @field_validator("path")
-    @classmethod
-    def _compiles(cls, path: str) -> str:
-        try:
-            groups = re.compile(path).groupindex
-        except re.error as error:
-            raise ValueError(f"not a regular expression: {error}") from error
-        for name in groups:
-            if not re.match(WORD, name):
-                raise ValueError(f"the group {name!r} is not a word in lower case")
-        return path
-
 
 class Join(Frozen):
-    """How the rows of several tables belong together."""
+    """The rule by which rows of several tables belong together."""
 
     by: Literal["rows", "clock"]
     """`rows`: the rows of one number belong together. `clock`: every table keeps its own rows and its own times."""
@@ -226,24 +214,20 @@ class ChannelGroup(Frozen):
     rest_source: Source | None = None
     """Source of `rest`; this key and the four above are fields of a `ChannelSpec`, in the unit of the channel."""
 
-    @field_validator("unit")
-    @classmethod
-    def _measures_its_kind(cls, unit: str, info: ValidationInfo) -> str:
-        kind = info.data.get("kind")
-        if kind in MUST_NAME_SENTINELS:
-            try:
-                _convertible(unit, MUST_NAME_SENTINELS[kind])
-            except ValueError as error:
-                raise ValueError(
-                    f"a {kind} is in {MUST_NAME_SENTINELS[kind]} or what converts to it ({error}); a scale's kg is "
-                    "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
-                ) from error
-        return unit
-
     @model_validator(mode="after")
     def _consistent(self) -> ChannelGroup:
         _convertible(self.given_in or self.unit, self.unit)
-        if self.kind in MUST_NAME_SENTINELS and self.sentinels is None:
+        measured = MUST_NAME_SENTINELS.get(self.kind)
+        if measured is None:
+            return self
+        try:
+            _convertible(self.unit, measured)
+        except ValueError as error:
+            raise ValueError(
+                f"a {self.kind} is in {measured} or a unit that converts to it ({error}); a scale's kg is "
+                "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
+            ) from error
+        if self.sentinels is None:
             raise ValueError(
                 f"a channel of kind {self.kind} must state its sentinels, the numbers that mean 'no sample': "
                 "`sentinels: [-1]`, or `sentinels: []` if there are none"
@@ -287,7 +271,7 @@ class StreamSource(Frozen):
 
 
 class SensorDeclaration(Frozen):
-    """What the source of the tables says about the sensor."""
+    """Description of the sensor, as far as the source of the tables gives one."""
 
     name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
     """Name of the sensor; words like ``{word}`` are filled in, so that one mapping covers several devices."""
@@ -325,7 +309,7 @@ class DataSource(Frozen):
     licence: str
     citation: str
     measured: str
-    """What was measured, in one line."""
+    """The measured quantity or event, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
     """Tasks that the recordings can answer; all are run where a command names none."""
     bytes: int = Field(ge=1)
@@ -341,7 +325,7 @@ class Mapping(Frozen):
     title: str
     sensor: SensorDeclaration
     clock: Literal["device", "host", "none"]
-    """Which clock the times are from: the device's, the host's, or none."""
+    """The clock that made the times: the device's, the host's, or none."""
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
@@ -357,7 +341,7 @@ class Mapping(Frozen):
     tasks: tuple[DeclaredTask, ...] = ()
     """Tasks that the recordings can answer, beside the installed ones."""
     source: DataSource | None = None
-    """Where the files can be had; None: the mapping is for files that are there already."""
+    """Source of the files; None: the mapping is for files that are there already."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
@@ -365,7 +349,7 @@ class Mapping(Frozen):
             if stream.table not in self.tables:
                 raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
             if (self.tables[stream.table].time is None) != (self.clock == "none"):
-                raise ValueError(f"clock is {self.clock}, but with `clock: none` alone {stream.table} has no time")
+                raise ValueError(f"clock is {self.clock}, so that table {stream.table} must have a time (or none)")
         join, several = self.join, len(self.tables) > 1
         if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
             raise ValueError("several tables need `join`, by rows or by clock, and can be no arrays")

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
-from tactbench.core.recording.mapping.bags import MESSAGE_TIMES
 from tactbench.core.recording.mapping.channels import MappedStream, no_translation
+from tactbench.core.recording.mapping.formats import MESSAGE_TIMES
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, TableSource, Time
 from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
@@ -19,12 +19,12 @@ from tactbench.core.spec import units
 from tactbench.core.spec.recording import Scalar, composed
 
 OUTSIDE, FAR_OUTSIDE = 3.0, 30.0
-"""How far the smallest or largest value of a channel lies from all others, in ranges of these, if it is taken for no
-reading: where it comes in short runs, and where it comes once or seldom."""
+"""Distances of the smallest or largest value of a channel from all others, in ranges of these, above which it is taken
+for no reading: where it stands in short runs, and where it stands once or seldom."""
 SHORT_RUN, SELDOM, OFTEN = 3.0, 0.1, 0.3
 """Longest mean run [rows], and largest shares of the rows. A contact has levels too, but stays on them."""
 APART = 5.0
-"""How far such a value lies from the sample before it, in mean steps of the others, where it lies within `OUTSIDE`."""
+"""Distance of such a value from the sample before it, in mean steps of the others, if it lies within `OUTSIDE`."""
 FEWEST_VALUES = 8
 """Fewest other values that a channel must have to be judged."""
 UNSIGNED_BITS = (8, 16, 32)
@@ -39,7 +39,7 @@ _NS_PER_YEAR = 365.2425 * 86400 * 1e9
 def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[StreamData, list[Finding]]:
     """Return a stream of a recording from its table and clock, and findings about values that seem to be no readings.
 
-    Where there is no sample the data are NaN, or 0 in a stream of whole numbers, and marked as missing.
+    Data without a sample are NaN, or 0 in a stream of whole numbers, and marked as missing.
 
     Raises
     ------

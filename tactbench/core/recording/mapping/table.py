@@ -1,15 +1,18 @@
-"""A foreign table in memory, which knows for every row where it stands in its file."""
+"""A foreign table in memory, which knows for every row where it stands in its file; the reader of text files."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -17,7 +20,7 @@ import numpy as np
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.health import listed
-from tactbench.core.recording.mapping.model import Column, Tabular, Time
+from tactbench.core.recording.mapping.model import Column, Csv, Records, Tabular, Text, Time
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec import units
 
@@ -26,6 +29,10 @@ _GROUPS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MARKS = ",.'’ \u00a0\u202f"
 """Marks that separate decimals and thousands in the languages of the world."""
+Line = tuple[int, list[str]]
+"""The cells of a row, and its line in the file."""
+Used = dict[Column, bool]
+"""The columns of a table that a mapping uses, and whether each holds readings: a float64 would round times."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +126,6 @@ class TextTable(Table):
 
     row: str = ":"
     how: Tabular = field(kw_only=True)
-    trailing: bool = False
-    """Whether every line of data ended with a delimiter that the header had not."""
 
     @cached_property
     def _no_sample(self) -> frozenset[str]:
@@ -170,7 +175,7 @@ class TextTable(Table):
             return math.inf
 
     def _hint(self, row: int, column: Column, wanted: str) -> str:
-        """Return the next step, by what the row or the spelling of the cell says of the cause."""
+        """Return the next step, by the cause that the row or the spelling of the cell shows."""
         cell = self._column(column)[row]
         columns = [self.values[place] for place in range(len(self.columns))]
         if cell in self.columns:
@@ -197,24 +202,6 @@ class TextTable(Table):
             words |= dict.fromkeys(odd if one == self.values[column] or 2 * len(odd) < len(self) else ())
         likely = json.dumps([*words][:12], ensure_ascii=False)
         return f"If all mean 'no sample', write `no_sample: {likely}` under `read`."
-
-
-@dataclass(frozen=True)
-class UsedColumns:
-    """The columns of a table that a mapping uses."""
-
-    numbers: tuple[Column, ...]
-    texts: tuple[Column, ...]
-    time: Time | None
-
-    @cached_property
-    def columns(self) -> tuple[Column, ...]:
-        """All columns that are used, each once."""
-        return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time.column]))))
-
-    def as_float(self, column: Column) -> bool:
-        """Return whether a column holds readings; a float64 would round times, which are kept as they are."""
-        return column in self.numbers and (self.time is None or column != self.time.column)
 
 
 def no_column(shown: str, column: Column, columns: Sequence[Column]) -> MappingError:
@@ -263,3 +250,119 @@ def _since_1970(date: re.Match[str], time: Time) -> int:
                 hint="Give the times with their offset, 2023-10-29T02:30:00+01:00, or in UTC.",
             )
     return (when - _EPOCH) // timedelta(seconds=1) * 10**9 + int(f"{fraction or '':0<9}")
+
+
+def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
+    """Read a text file.
+
+    Raises
+    ------
+    MappingError
+        If the file cannot be read, is empty, or has rows of different lengths.
+    """
+    content = path.read_bytes()
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, wrong = content[: error.start].count(b"\n") + 1, content[error.start]
+        raise MappingError(
+            f"{shown}:{line} is not UTF-8 text: byte 0x{wrong:02x}, {bytes([wrong]).decode('latin-1')!r} in Latin-1.",
+            hint="If the file is in Latin-1, convert it: `iconv -f LATIN1 -t UTF-8 FILE > NEW`.",
+        ) from error
+    if "\0" in text:
+        raise MappingError(
+            f"{shown}:{text.count(chr(10), 0, text.index(chr(0))) + 1} has NUL bytes, as a power cut leaves them.",
+            hint="Remove the lines that have some; if all have, the file is UTF-16: `iconv -f UTF-16 -t UTF-8`.",
+        )
+    # Not splitlines(): that also breaks at form feeds and Unicode separators, and line numbers would be wrong. Lines
+    # that are left out stay as blank ones, so that the others keep their numbers.
+    lines = [
+        "\n" if skipped(place, how) else line for place, line in enumerate(io.StringIO(text, newline="").readlines())
+    ]
+    if how.comment is not None:
+        kept = (line.partition(how.comment)[0] for line in lines)
+        lines = [line if line.strip() else "\n" for line in kept]
+    if isinstance(how, Csv):
+        return table_of(shown, list(_delimited(lines, shown, how)), how)
+    cells = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
+    return table_of(shown, _joined(cells, shown, how) if isinstance(how, Records) else cells, how)
+
+
+def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
+    """Return the table of some lines, of which the first is the header if `how` says so."""
+    header = tuple(cell.strip() for cell in lines.pop(0)[1]) if how.header and lines else ()
+    if not lines:
+        raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skiprows`.")
+    wide = len(header or lines[0][1])
+    mark = comment_mark(header[0]) if header else None
+    if mark and wide < len(lines[0][1]):
+        raise MappingError(
+            f"{shown}: a comment, {header[0]!r}, stands where the header is expected.",
+            hint=f"Write `comment: {mark!r}` under `read`.",
+        )
+    trailing = bool(header) and all(len(cells) == wide + 1 and not cells[-1].strip() for _, cells in lines)
+    for number, cells in lines:
+        if len(cells) != wide + trailing:
+            mark = comment_mark(cells[0])
+            raise MappingError(
+                f"{shown}:{number}: {len(cells)} cells, where {wide} are expected.",
+                hint=f"If this line is a comment, write `comment: {mark!r}` under `read`." if mark else
+                "Repair the row, or correct the delimiter; a file cut short ends like this.",
+            )  # fmt: skip
+    turned = zip(*(cells for _, cells in lines), strict=True)
+    columns = [[cell.strip() for cell in column] for column in turned][:wide]
+    names: dict[Column, list[str]] = {
+        name: column for name, column in zip(header, columns, strict=False) if header.count(name) == 1
+    }
+    places = [number for number, _ in lines]
+    values = names | dict(enumerate(columns))
+    return TextTable(shown, header or tuple(range(wide)), places, values, how=how)
+
+
+def skipped(place: int, how: Tabular) -> bool:
+    """Return whether a line, counted from 0, is left out."""
+    return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
+
+
+def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
+    """Yield the lines that are not blank, cut into cells."""
+    first = next((line for line in lines if line.strip()), "")
+    if first.lower().startswith("sep="):
+        hint = f"Write `skiprows: {lines.index(first) + 1}` under `read`, and `delimiter: {first[4:5]!r}`."
+        raise MappingError(f"{shown} begins with {first.strip()!r}, a line for Excel.", hint=hint)
+    for mark in "\t;":
+        if mark in first and how.delimiter not in first:
+            raise MappingError(
+                f"{shown} is separated by {json.dumps(mark)}, and not by {how.delimiter!r}.",
+                hint=f"Write `delimiter: {json.dumps(mark)}` under `read`.",
+            )
+    reader = csv.reader(lines, delimiter=how.delimiter, strict=True)
+    try:
+        yield from ((reader.line_num, cells) for cells in reader if cells)
+    except csv.Error as error:
+        raise MappingError(
+            f"{shown}:{reader.line_num}: {error}.", hint="Check the quotes and the delimiter."
+        ) from error
+
+
+def _joined(lines: Sequence[Line], shown: str, how: Records) -> list[Line]:
+    """Return a row for the lines of each record; raises MappingError for a line of another length."""
+    per_row = len(how.numbers_per_line)
+    rows: list[Line] = []
+    for place, (number, cells) in enumerate(lines):
+        line, wide = place % per_row, how.numbers_per_line[place % per_row]
+        if len(cells) != wide:
+            raise MappingError(
+                f"{shown}:{number}: {len(cells)} numbers on line {line + 1} of a record, where {wide} are expected.",
+                hint="Repair the record, or correct `numbers_per_line`.",
+            )
+        if line:
+            rows[-1][1].extend(cells)
+        else:
+            rows.append((number, cells))
+    if len(lines) % per_row:
+        raise MappingError(
+            f"{shown}: the file ends after line {len(lines) % per_row} of a record of {per_row} lines.",
+            hint="The file was cut short: get it again.",
+        )
+    return rows

@@ -143,9 +143,3 @@ def test_a_counter_that_wraps(tables, bits, unit, step):
     tables.refused("press.csv:1:", tables__table__time=time | {"wraps_at": 2 ** (bits - 1)})
     made = taxels(tables.run(tables__table__time=time | {"wraps_at": 2**bits}))
     assert np.array_equal(made.t_ns, counted * {"us": 10**3, "ms": 10**6}[unit])
-
-
-def test_rows_out_of_order_are_no_counter(tables):
-    tables.put("press.csv", "".join(f"{stamp},{row},2,3,{row}\n" for row, stamp in enumerate((10, 20, 30, 0, 10, 20))))
-    (made,) = tables.run().recordings
-    assert [one.check for one in made.findings if one.severity == "error"] == ["backward"]
