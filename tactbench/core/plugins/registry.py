@@ -17,7 +17,7 @@ from importlib.metadata import Distribution, EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Generic, Literal, TypeVar, cast, get_args
+from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, get_args
 
 import pluggy
 
@@ -47,8 +47,7 @@ Descriptor = (
 D = TypeVar("D", bound=Descriptor)
 
 
-@dataclass(frozen=True)
-class PluginRow:
+class PluginRow(NamedTuple):
     """An entry point, and whether it could be loaded."""
 
     entry_point: str
@@ -60,8 +59,7 @@ class PluginRow:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class Owned(Generic[D]):
+class Owned(NamedTuple, Generic[D]):
     """A descriptor, and the plugin that defines it."""
 
     descriptor: D
