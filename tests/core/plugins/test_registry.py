@@ -152,6 +152,15 @@ def test_what_an_import_changes_changes_nothing_here(site):
     assert "patch" not in sys.modules
 
 
+def test_a_package_of_mappings_needs_no_hook(site):
+    (site.folder / "maps" / "datasets").mkdir(parents=True)
+    (site.folder / "maps" / "__init__.py").write_text("TACTBENCH_API = 2")
+    write_metadata(site.folder, "maps", "1", points="maps = maps")
+    assert site.load().failures
+    (site.folder / "maps" / "datasets" / "one.yaml").touch()
+    assert site.load().failures == []
+
+
 def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     more = PAD.replace('[sensor("pad")]', '[sensor("pad"), sensor("mat")]')
     registry = site.install("pad-maker", PAD).install("copycat", more).load()
