@@ -81,7 +81,7 @@ TAKEN_AND_REFUSED = [
     (Simulation, {}, [{}, {"rung": "fine"}, {"tolerance": 1.0}, {"effects": ("+all", "-creep", "drift")}],
      [{"rung": "fine", "tolerance": 1.0}, {"effects": ("creep!",)}, {"tolerance": 0.0}, {"nuisances": {"a": NAN}}]),
     (Summary, {"measure": "mean"},
-     [{}, {"start": 1.0, "end": 2.0, "unit": "s"}, {"measure": "band-energy", "band_hz": (5, 20)}],
+     [{}, {"start": 1.0, "end": 2.0, "unit": "s"}, {"measure": "band-energy", "band_hz": (0.5, 20)}],
      [{"start": 1.0}, {"end": 1.1}, {"band_hz": (5, 20)}, {"measure": "band-energy"},
       *({"measure": "band-energy", "band_hz": band} for band in ((0, 20), (20, 20), (20, 5)))]),
     (ComparisonChoice, {}, [{"sensors": ("a", "b")}, {"estimators": ("a", "b")}],
