@@ -240,7 +240,10 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Return the descriptors of a plugin as plain data."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    return {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    found = {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    for descriptor, dumped in zip(offered.get("sensors", ()), found.get("sensors", ()), strict=True):
+        dumped["spec"]["ranges"] = dict(descriptor.spec.ranges)  # recordings and keys leave them out, too
+    return found
 
 
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:

@@ -11,18 +11,21 @@ from tactbench.core.errors import DuplicateNameError, PluginError, UsageError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import Owned, Registry, installed, load_object, load_registry
 from tactbench.plugin import RigDescriptor
+from tactbench.plugin.simulation import ranges
 from tests.core.matrix.plugin_packages import write_metadata
 
 HEAD = """
 from tactbench.plugin import *
 from tactbench.plugin.devices import DeviceDescriptor
+from tactbench.plugin.simulation import ranges
 from tactbench.tasks.force import SPEC as FORCE
 from tactbench.sensors.ideal import SPEC as IDEAL
 
 TACTBENCH_API = 2
 
 def sensor(name):
-    return SensorDescriptor(spec=IDEAL.model_copy(update={"name": name}))
+    stated = ranges(("taxel_white_count", 1.0, 2.0, "count", "assumed", "a test"))
+    return SensorDescriptor(spec=IDEAL.model_copy(update={"name": name, "ranges": stated}))
 """
 PAD = HEAD + '\n@hookimpl\ndef tactbench_sensors():\n    return [sensor("pad")]\n'
 EVERYTHING = (
@@ -108,7 +111,8 @@ def test_a_plugin_may_bring_every_kind_of_thing(site):
     assert registry.refused == []  # a sensor and a device may share a name
     owned = registry.sensors.owned("pad")
     assert (owned.module, owned.distribution, owned.version) == ("every_thing", "every-thing", "2.1")
-    ideal = installed().sensors["ideal"].spec.model_copy(update={"name": "pad"})
+    stated = ranges(("taxel_white_count", 1.0, 2.0, "count", "assumed", "a test"))
+    ideal = installed().sensors["ideal"].spec.model_copy(update={"name": "pad", "ranges": stated})
     assert owned.descriptor.spec == ideal, "a descriptor from a child process is the one that the plugin gave"
     guess = registry.estimators["guess"]
     assert (guess.params, guess.grid) == ({"a": 1, "b": (1.5, float("inf")), "c": None, "d": "x"}, {"a": (1, 2.5)})
