@@ -22,12 +22,8 @@ _BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index")
 
 
 class DeclaredTask(TaskFields):
-    """A task as a mapping declares it; what it leaves out follows from the target."""
+    """A task as a mapping declares it; what it leaves out follows from the target and the name."""
 
-    title: str = ""
-    """Title; empty: the name."""
-    question: str = ""
-    """The question in one sentence, for people."""
     target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
     answer: Literal["number", "class"] | None = None
     """Whether a label is a number or, by default, a class; None for a channel."""
@@ -41,6 +37,7 @@ class DeclaredTask(TaskFields):
     """Names of estimators; empty: two that fit the target."""
     baselines: tuple[str, ...] = ()
     """Names of trivial estimators; empty: the usual ones."""
+    equivalence: float | None = Field(default=None, ge=0)
 
     @property
     def _answer(self) -> str:

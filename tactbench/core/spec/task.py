@@ -162,6 +162,9 @@ class TaskFields(Frozen):
     """Fields of tasks of plugins and of those that mappings declare."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    title: str = ""
+    question: str = ""
+    """The question in one sentence."""
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels that an estimator may use."""
     optional_features: tuple[ChannelKind, ...] = ()
@@ -170,8 +173,6 @@ class TaskFields(Frozen):
     """Numbers of each channel that are the features of a recording or of a frame."""
     vote: Literal["frames"] | None = None
     """Combination of frames to the answer for a recording: the commonest class, the first of equals, or the mean."""
-    equivalence: float | None = Field(default=None, ge=0)
-    """Largest difference of scores that are the same in practical use, in the metric's unit; None: not stated."""
 
 
 class TaskSpec(TaskFields):
@@ -179,7 +180,6 @@ class TaskSpec(TaskFields):
 
     title: str
     question: str
-    """The question in one sentence."""
     kind: Literal["regression", "classification", "events"]
     """Kind of answer. For `events`, it is when something begins: detectors score frames, `alarms` makes alarms."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
@@ -198,6 +198,8 @@ class TaskSpec(TaskFields):
     """Name of the primary metric; see docs/glossary.md."""
     unit: str = "1"
     """Unit of the primary metric."""
+    equivalence: float | None = Field(default=None, ge=0)
+    """Largest difference of scores that are the same in practical use, in the metric's unit; None: not stated."""
     scenes: tuple[PlannedScene, ...] = ()
     """Scenes that a rig records; empty: only recordings made elsewhere can answer."""
     campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)
