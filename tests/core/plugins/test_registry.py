@@ -7,7 +7,7 @@ from importlib import metadata
 
 import pytest
 
-from tactbench.core.errors import DuplicateNameError, PluginError, UsageError
+from tactbench.core.errors import DuplicateNameError, PluginError, UnknownNameError, UsageError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import Owned, Registry, installed, load_object, load_registry
 from tactbench.plugin import RigDescriptor
@@ -172,6 +172,8 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     assert registry.sensors.names() == ["mat"]
     with pytest.raises(DuplicateNameError, match=r"'pad'.*copycat.*pad-maker") as error:
         registry.sensors["pad"]  # it is known, and refused when it is asked for
+    with pytest.raises(UnknownNameError, match="'mad'.*'mat'"):
+        registry.sensors["mad"]
     assert [str(error.value)] == [str(refused) for refused in registry.refused]
 
 
