@@ -172,7 +172,7 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     assert registry.sensors.names() == ["mat"]
     with pytest.raises(DuplicateNameError, match=r"'pad'.*copycat.*pad-maker") as error:
         registry.sensors["pad"]  # it is known, and refused when it is asked for
-    with pytest.raises(UnknownNameError, match="'mad'.*'mat'"):
+    with pytest.raises(UnknownNameError, match=r"'mad'.*'mat'"):
         registry.sensors["mad"]
     assert [str(error.value)] == [str(refused) for refused in registry.refused]
 
