@@ -46,10 +46,11 @@ class Indenter(Frozen):
         if not isinstance(given, Mapping) or given.get("shape") not in ("cap", "flat"):
             return given
         own, dimensions = dict(given), dict(given.get("dimensions") or {})
-        if own.pop("shape") == "cap":
+        is_cap = own.pop("shape") == "cap"
+        if is_cap:
             own.setdefault("radius", dimensions.pop("radius", None))
-            if own["radius"] is None:
-                raise ValueError("dimensions: a cap is given by its radius, and none is given")
+        if is_cap == (own.get("radius") is None):
+            raise ValueError("radius: a cap has one, and a flat surface none")
         return {**own, "dimensions": dimensions}
 
     @model_validator(mode="after")

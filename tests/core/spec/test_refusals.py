@@ -70,7 +70,7 @@ TAKEN_AND_REFUSED = [
       {"times_s": (0.0, 1.0)}, {"forces_n": (0.0, -1.0, 0.0)}, {"forces_n": (0.0, NAN, 0.0)}]),
     (Indenter, {}, [{}, {"shape": "flat"}, {"shape": "cap", "radius": q(2)}, {"radius": q(2)},
                     {"shape": "cap", "dimensions": {"radius": q(2)}}, {"shape": "pin", "angle": q(30, "deg")}],
-     [{"shape": "cap"}, {"shape": "pin", "radius": q(2)}, {"shape": "cap", "dimensions": {"radius": q(2), "a": q(2)}},
+     [{"shape": "cap"}, {"shape": "flat", "radius": q(2)}, {"shape": "pin", "radius": q(2)}, {"shape": "cap", "dimensions": {"radius": q(2), "a": q(2)}},
       {"dimensions": {"a": q(1)}}, {"radius": q(2), "angle": q(30, "deg")}, {"angle": q(30, "deg")}]),
     (Surface, {"static_friction": q(0.5, "1"), "kinetic_friction": q(0.5, "1")},
      [{}, {"kinetic_friction": q(0.0, "1")}, {"stribeck_speed": q(0, "mm/s"), "roughness": q(0), "hurst": q(1, "1")}],
