@@ -34,12 +34,9 @@ def load_yaml(path: Path, model: type[M]) -> M:
     file = str(path)
     try:
         node, data = _loaded(path.read_text(encoding="utf-8"), file)
-    except OSError as error:
-        raise ConfigError(
-            file, None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
-        ) from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(file, None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", "") or "it is not UTF-8 text"
+        raise ConfigError(file, None, f"cannot be read: {reason}.", hint="Check the path and the file.") from error
     if node is None:
         raise ConfigError(file, None, "is empty.", hint="See docs/ for an example.")
     places: Places = {}
