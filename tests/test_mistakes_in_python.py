@@ -59,6 +59,10 @@ def test_of_tasks(folder, argument, given, shown):
     _named(lambda: tactbench.load_task(**arguments), argument, shown)
 
 
+def test_of_a_protocol_that_the_task_does_not_allow(folder):
+    _named(lambda: tactbench.load_task("shear-force", folder, "karl2016"), "protocol", "karl2016")
+
+
 @pytest.mark.parametrize(
     ("argument", "given", "shown", "more"),
     [
