@@ -72,8 +72,11 @@ def _door(door: str) -> Iterator[str]:
         classes = {node.name: node for node in source.body if isinstance(node, ast.ClassDef)}
         for node, after in _statements(source.body):
             if came_from.get(_target(node)) == module:
-                for base in (classes.get(one) for one in _bases(node) if one.startswith("_")):
-                    node.body += [] if base is None else base.body
+                hidden = {one for one in _bases(node) if one in classes and came_from.get(one) != module}
+                for base in hidden:
+                    node.body += classes[base].body
+                if isinstance(node, ast.ClassDef):
+                    node.bases = [one for one in node.bases if ast.unparse(one) not in hidden]
                 yield f"#### `{_target(node)}`\n\n{_described(node, after)}\n"
 
 
@@ -107,7 +110,7 @@ def _described(node: ast.AST, after: ast.AST | None) -> str:
     if isinstance(node, ast.FunctionDef):
         return f"`{_signature(node)}`\n\n{_markdown(ast.get_docstring(node))}"
     if isinstance(node, ast.ClassDef):
-        bases = [base for base in _bases(node) if base != "Frozen" and not base.startswith("_")]
+        bases = [base for base in _bases(node) if base != "Frozen"]
         kind = f"A kind of {', '.join(f'`{base}`' for base in bases)}. " if bases else ""
         members = "\n".join(_members(node))
         return f"{kind}{_markdown(ast.get_docstring(node))}" + (f"\n\n{members}" if members else "")

@@ -1,4 +1,4 @@
-"""What many tests need: the real recordings, and strangers' packages on the path of a fresh interpreter."""
+"""Fixtures of many tests: the real recordings, and the command line with packages of third parties on its path."""
 
 from __future__ import annotations
 
@@ -16,35 +16,32 @@ from hypothesis import settings
 
 from tactbench.core.pool import preload
 
-# A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
-# every time, so that a red run means a change; people's own runs keep exploring.
+# Continuous integration draws the same examples every time, so that a red run means a change. A deadline would test the
+# machine.
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
-# Threads of numerical libraries wait for each other in a loop: beside other work each wait costs a time slice. Set
-# before any of them is loaded; tests of several threads ask for them.
+# Threads of numerical libraries wait for each other in a loop, which costs time slices beside other work.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Thousands of tests are objects that live to the end: a collection that looks at all of them finds nothing.
-gc.set_threshold(100_000, 50, 100)
+gc.set_threshold(100_000, 50, 100)  # the objects of thousands of tests live to the end
 
 
 def pytest_collection_finish():
-    """Leave what collection made out of all later collections of garbage."""
+    """Leave the objects of test collection out of all later collections of garbage."""
     gc.collect()
     gc.freeze()
 
 
-# Commands that tests start compile the package once, not each of them anew.
+# Commands that tests start compile the package once.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
-# every test would import that again, which takes five times as long as the cell: so it is started before any test
-# module is imported.
+# The fork server keeps the modules that it was started with. Without scikit-learn every cell of every test would import
+# that again, which takes five times as long as the cell.
 preload("tactbench.core.matrix.preloaded")
 
-# A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
+# A shell's background jobs ignore Ctrl-C, and so do their children: tests that send one would wait for ever.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -62,7 +59,7 @@ def shared_data() -> Path:
 
 
 class Shell:
-    """Runs the command line as a person would, in a fresh interpreter."""
+    """Runs the command line in a fresh interpreter, in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -82,15 +79,7 @@ class Shell:
 
 
 class Verbs:
-    """Calls the command line in this process, for what needs no fresh interpreter.
-
-    Parameters
-    ----------
-    folder
-        Where the commands are called.
-    here
-        Recordings and cells are made in this process too: for what is not about processes, limits or several jobs.
-    """
+    """Calls the command line in this process, in `folder`; with `here` recordings and cells are made in it too."""
 
     def __init__(self, folder: Path, *, here: bool = False) -> None:
         self.folder = folder

@@ -122,15 +122,7 @@ def test_the_generated_pages_have_every_verb_and_field():
     written = runpy.run_path(str(CHECKOUT / "docs" / "parameter_reference.py"))["reference"]()
     assert re.search(r"^\| taxel_white_count \| .* \| measured: \w+", written, re.MULTILINE)
     written = runpy.run_path(str(CHECKOUT / "docs" / "plugin_reference.py"))["rig_files"]()
-    for name in (
-        "zero_s",
-        "batches_ahead",
-        "skin_type",
-        "rate_hz",
-        "lower_m",
-        "homing",
-        "link_mm",
-    ):
+    for name in ("zero_s", "batches_ahead", "skin_type", "rate_hz", "lower_m", "homing", "link_mm"):
         assert re.search(rf"^- `{name}: .*`: .", written, re.MULTILINE), name
 
 
@@ -157,9 +149,8 @@ def test_the_rows_of_the_readme_are_those_of_the_board_and_of_the_frozen_scores(
 
 def test_the_sensitivity_of_the_readme_is_that_of_its_page_and_of_the_frozen_scores():
     page = (CHECKOUT / "docs" / "calibration.md").read_text(encoding="utf-8")
-    lines = re.findall(
-        r"^\| (?:as stated|offset_scale|placement_).*\|$", README.read_text(encoding="utf-8"), re.MULTILINE
-    )
+    text = README.read_text(encoding="utf-8")
+    lines = re.findall(r"^\| (?:as stated|offset_scale|placement_).*\|$", text, re.MULTILINE)
     assert len(lines) >= 3
     assert [line for line in lines if line not in page] == []
     (campaigns,) = re.findall(r"^#+ curvature · .* · forest · (\d+) campaigns", page, re.MULTILINE)

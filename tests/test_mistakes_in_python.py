@@ -53,13 +53,14 @@ OF_TASKS = [
 ]
 
 
-@pytest.mark.parametrize("call", ["load_task", "evaluate"])
 @pytest.mark.parametrize(("argument", "given", "shown"), OF_TASKS)
-def test_of_tasks(folder, call, argument, given, shown):
+def test_of_tasks(folder, argument, given, shown):
     arguments = {"task": "force", "recordings": folder, argument: given}
-    if call == "evaluate":
-        arguments["estimator"] = Ridge()
-    _named(lambda: getattr(tactbench, call)(**arguments), argument, shown)
+    _named(lambda: tactbench.load_task(**arguments), argument, shown)
+
+
+def test_of_a_protocol_that_the_task_does_not_allow(folder):
+    _named(lambda: tactbench.load_task("shear-force", folder, "karl2016"), "protocol", "karl2016")
 
 
 @pytest.mark.parametrize(

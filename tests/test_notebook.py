@@ -138,12 +138,6 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     assert all("StandardScaler+Ridge" in shown for shown in (repr(found), found._repr_html_()))
 
 
-def test_a_result_has_no_interval_where_its_table_has_none(folder):
-    found = tactbench.evaluate(scaled(Ridge()), "force", tactbench.open_recordings(folder)[:3])
-    shown = next(row for row in found if row["estimator"] == "StandardScaler+Ridge")
-    assert shown["ci_low"] is found.interval is found.row["ci_low"] is None
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [

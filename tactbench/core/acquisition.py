@@ -76,7 +76,7 @@ def acquire(
         has_devices = hasattr(acquisition, "stream_counts")
         began_s = time.perf_counter()
 
-        def conclude(why: str) -> None:
+        def conclude(reason: str) -> None:
             """Write the facts that are known at the end, with the reason for its exclusion, if there is one."""
             factor = whole.seconds / (time.perf_counter() - began_s)
             drawn = dict(acquisition.drawn)
@@ -85,10 +85,10 @@ def acquire(
                 plan=tuple(acquisition.plan),
                 assumptions=dict(acquisition.assumptions),
                 drawn=drawn,
-                remarks=(*remarks, why) if why else remarks,
-                excluded=why,
+                remarks=(*remarks, reason) if reason else remarks,
+                excluded=reason,
                 provenance={**request.provenance, "sim_s" if simulated else "acquisition_s": spent},
-                **_of_devices(acquisition, request, writer.rows, cut_short=bool(why), factor=factor),
+                **_of_devices(acquisition, request, writer.rows, cut_short=bool(reason), factor=factor),
             )
 
         with RecordingWriter(request.path, meta) as writer:
@@ -108,21 +108,21 @@ def acquire(
                 lacking = ""
                 if has_devices:
                     _check_not_silent(acquisition, writer.rows)
-                    lacking = _lacking(acquisition, whole)
+                    lacking = _incompleteness(acquisition, whole)
             except BaseException as error:
                 ignore_interrupts()
-                alarm = _stopped(acquisition, error)
+                alarm = _stop(acquisition, error)
                 if not simulated and any(writer.rows.values()):
                     with suppress(RecordingError):  # a full disk: the journal stays with the earlier rows
-                        conclude(f"interrupted: {_why(error)}")
+                        conclude(f"interrupted: {_reason_of(error)}")
                         if complete_interrupted:
                             writer.complete()
                 if alarm:
                     raise RigError(
-                        f"It was interrupted ({_why(error)}), and the rig is not as it should be: {alarm}."
+                        f"It was interrupted ({_reason_of(error)}), and the rig is not as it should be: {alarm}."
                     ) from error
                 raise
-            alarm = _stopped(acquisition, RigError(lacking)) if lacking else ""
+            alarm = _stop(acquisition, RigError(lacking)) if lacking else ""
             if alarm:
                 with suppress(RecordingError):
                     conclude(INCOMPLETE + lacking)
@@ -132,7 +132,7 @@ def acquire(
     return writer.meta
 
 
-def _lacking(acquisition: Any, whole: Completeness) -> str:
+def _incompleteness(acquisition: Any, whole: Completeness) -> str:
     """Return the reason for which a recording of devices is incomplete; empty: it is complete."""
     ended = str(getattr(acquisition, "ended", ""))
     found = [f"ended before its time: {ended}"] if ended else []
@@ -156,17 +156,17 @@ def _one_thread() -> AbstractContextManager[Any]:
     return thread_limit(1)
 
 
-def _stopped(acquisition: Acquisition, error: BaseException) -> str:
+def _stop(acquisition: Acquisition, error: BaseException) -> str:
     """Stop all motion before anything is written; return what remains to be done by hand where that fails."""
     stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
-    return "" if stop is None else stop(_why(error))
+    return "" if stop is None else stop(_reason_of(error))
 
 
-def _why(error: BaseException) -> str:
+def _reason_of(error: BaseException) -> str:
     return "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
 
 
-def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
+def _with_written(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
     """Return counts with the written rows; rows in transit when the recording was cut short count as dropped."""
     left = max(0, counts.received - written - counts.dropped - counts.duplicates - counts.late) if cut_short else 0
     return counts.model_copy(update={"written": written, "dropped": counts.dropped + left})
@@ -188,12 +188,12 @@ def _of_devices(
         "simulated": request.rig.simulated or emulation is not None,
         "emulation": emulation,
         "clock": "simulated" if simulated else "host",
-        "streams": {name: _settled(one, rows.get(name, 0), cut_short) for name, one in counts.items()},
+        "streams": {name: _with_written(one, rows.get(name, 0), cut_short) for name, one in counts.items()},
         "counts": dict(getattr(acquisition, "counts", {})),
     }
 
 
-def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
+def _is_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
     """Return whether a device states in its facts that it is emulated, which a rig file may leave out."""
     return any(key.startswith(f"{name} ") and "emulat" in str(value).lower() for key, value in drawn.items())
 
@@ -204,7 +204,7 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
         name
         for name, entry in file.entries().items()
         if (name == sensor or name not in file.sensors)
-        and (entry.emulated or entry.emulator or _says_emulated(name, acquisition.drawn))
+        and (entry.emulated or entry.emulator or _is_emulated(name, acquisition.drawn))
     ]  # fmt: skip
     if file is None or not names:
         return None

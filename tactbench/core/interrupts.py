@@ -38,10 +38,10 @@ def end_alike() -> None:
         signal.signal(number, interrupt)
     for number in ENDING:  # what is removed when Python ends is removed whole
         atexit.register(signal.signal, number, signal.SIG_IGN)
-    sys.unraisablehook = _again
+    sys.unraisablehook = _send_again
 
 
-def _again(dropped: Any) -> None:
+def _send_again(dropped: Any) -> None:
     """Send a signal again whose exception Python has dropped: in a weak reference's callback, in ``__del__``."""
     global _raised_s
     if isinstance(dropped.exc_value, KeyboardInterrupt):

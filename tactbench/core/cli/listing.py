@@ -49,11 +49,10 @@ def _titles(registry: Registry, family: str) -> dict[str, str]:
 
 
 def _plugins(registry: Registry, shape: str) -> None:
-    from dataclasses import asdict
 
     refused = [str(error) for error in registry.refused]
     if shape == "json":
-        click.echo(json_text({"plugins": [asdict(row) for row in registry.plugins], "refused": refused}, indent=1))
+        click.echo(json_text({"plugins": [row._asdict() for row in registry.plugins], "refused": refused}, indent=1))
         return
     rows = sorted(registry.plugins, key=lambda row: row.status == "loaded")
     records = [

@@ -129,7 +129,7 @@ class Explained(NamedTuple):
 class Explaining(Rig, Protocol):
     """A simulated rig that explains its plan and the cost of each effect."""
 
-    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
+    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = ...) -> Sequence[Explained]:
         """Return every installed effect, the included ones first, in the order in which they are applied.
 
         `rounds` > 0 carries the scene out that often, for the median cost of each effect.
@@ -198,11 +198,11 @@ class CostPoint:
     unit: str
     floor: float
     """Standard deviation of the observable's own noise; infinity where it has none."""
-    default: bool = False
+    default: bool
     """Whether this is the default."""
-    rung: str = ""
+    rung: str
     """Name of the rung that this is; empty: it is none."""
-    settings: Mapping[str, Scalar] = field(default_factory=dict)
+    settings: Mapping[str, Scalar]
     """Settings of this way."""
 
 

@@ -17,7 +17,7 @@ from importlib.metadata import Distribution, EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Generic, Literal, TypeVar, cast, get_args
+from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, get_args
 
 import pluggy
 
@@ -47,8 +47,7 @@ Descriptor = (
 D = TypeVar("D", bound=Descriptor)
 
 
-@dataclass(frozen=True)
-class PluginRow:
+class PluginRow(NamedTuple):
     """An entry point, and whether it could be loaded."""
 
     entry_point: str
@@ -60,8 +59,7 @@ class PluginRow:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class Owned(Generic[D]):
+class Owned(NamedTuple, Generic[D]):
     """A descriptor, and the plugin that defines it."""
 
     descriptor: D
@@ -243,7 +241,10 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Return the descriptors of a plugin as plain data."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    return {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    found = {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    for descriptor, dumped in zip(offered.get("sensors", ()), found.get("sensors", ()), strict=True):
+        dumped["spec"]["ranges"] = dict(descriptor.spec.ranges)  # recordings and keys leave them out, too
+    return found
 
 
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:

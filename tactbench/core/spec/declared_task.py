@@ -8,8 +8,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import complaint
 from tactbench.core.spec.quantity import Frozen
-from tactbench.core.spec.sensor import ChannelKind
-from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, Summary, TaskSpec, VectorTarget
+from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, TaskFields, TaskSpec, VectorTarget
 
 FILE = "tasks.yaml"
 """Name of the file of these tasks beside the recordings."""
@@ -22,14 +21,9 @@ _ESTIMATORS = {"number": ("forest", "ridge"), "vector": ("forest-100", "ridge"),
 _BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index"), "class": ("majority", "chance")}
 
 
-class DeclaredTask(Frozen):
-    """A task as a mapping declares it; what it leaves out follows from the target."""
+class DeclaredTask(TaskFields):
+    """A task as a mapping declares it; what it leaves out follows from the target and the name."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
-    title: str = ""
-    """Title; empty: the name."""
-    question: str = ""
-    """The question in one sentence, for people."""
     target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
     answer: Literal["number", "class"] | None = None
     """Whether a label is a number or, by default, a class; None for a channel."""
@@ -37,12 +31,7 @@ class DeclaredTask(Frozen):
     """Metric; None: the first that fits the target."""
     splits: tuple[str, ...] = Field(min_length=1)
     """Splits, the default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
-    features: tuple[ChannelKind, ...] = ("taxel",)
-    optional_features: tuple[ChannelKind, ...] = ()
-    """Further kinds of channels, used where a sensor has them."""
     answer_per: Literal["sample", "recording"] = "sample"
-    summaries: tuple[Summary, ...] = ()
-    vote: Literal["frames"] | None = None
     protocols: tuple[str, ...] = Field(default=("deployable",), min_length=1)
     estimators: tuple[str, ...] = ()
     """Names of estimators; empty: two that fit the target."""

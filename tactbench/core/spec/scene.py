@@ -46,10 +46,11 @@ class Indenter(Frozen):
         if not isinstance(given, Mapping) or given.get("shape") not in ("cap", "flat"):
             return given
         own, dimensions = dict(given), dict(given.get("dimensions") or {})
-        if own.pop("shape") == "cap":
+        is_cap = own.pop("shape") == "cap"
+        if is_cap:
             own.setdefault("radius", dimensions.pop("radius", None))
-            if own["radius"] is None:
-                raise ValueError("dimensions: a cap is given by its radius, and none is given")
+        if is_cap == (own.get("radius") is None):
+            raise ValueError("radius: a cap has one, and a flat surface none")
         return {**own, "dimensions": dimensions}
 
     @model_validator(mode="after")
@@ -63,7 +64,7 @@ class Indenter(Frozen):
         return self
 
     @model_serializer(mode="wrap")
-    def _as_ever(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _stored_form(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Return the stored form: caps and flat surfaces have a radius only, as in earlier recordings."""
         stored: dict[str, Any] = serialize(self)
         return stored if self.shape is not None else {"radius": stored["radius"]}
@@ -159,7 +160,7 @@ class Surface(Frozen):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_one_band(cls, given: Any) -> Any:
+    def _read_earlier_form(cls, given: Any) -> Any:
         """Return the surface of an earlier recording, a band about one wavelength, with that as its roll-off."""
         if isinstance(given, Mapping) and "wavelength" in given:
             left = {name: value for name, value in given.items() if name != "spread"}
@@ -167,7 +168,7 @@ class Surface(Frozen):
         return given
 
     @model_validator(mode="after")
-    def _is_possible(self) -> Surface:
+    def _is_physical(self) -> Surface:
         static, kinetic = self.static_friction.to("1"), self.kinetic_friction.to("1")
         if not static >= kinetic >= 0:
             raise ValueError(f"friction must be static >= kinetic >= 0, not {static:g} and {kinetic:g}")
@@ -192,7 +193,7 @@ class Slide(Frozen):
     surface: Surface = Surface()
 
     @model_validator(mode="after")
-    def _moves(self) -> Slide:
+    def _is_motion(self) -> Slide:
         if not self.speed.to("mm/s") > 0 or self.start.to("s") < 0:
             raise ValueError("a slide has a speed above 0 and starts at 0 s or later")
         if self.duration is not None and not self.duration.to("s") > 0:

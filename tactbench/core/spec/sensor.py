@@ -144,7 +144,7 @@ class Nuisances(Frozen):
 
     @model_validator(mode="before")
     @classmethod
-    def _without_largest_slope(cls, given: Any) -> Any:
+    def _read_earlier_form(cls, given: Any) -> Any:
         """Return nuisances of an earlier recording without a field that was given up."""
         if isinstance(given, dict) and "largest_slope" in given:
             return {name: value for name, value in given.items() if name != "largest_slope"}

@@ -158,25 +158,34 @@ class Summary(Frozen):
         return f"{self.measure}{band}{'' if whole else f' {self.start:g}-{self.end:g} {unit}'}{kinds}"
 
 
-class TaskSpec(Frozen):
-    """A task as data, which the core carries out."""
+class TaskFields(Frozen):
+    """Fields of tasks of plugins and of those that mappings declare."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
-    title: str
-    question: str
+    title: str = ""
+    question: str = ""
     """The question in one sentence."""
-    kind: Literal["regression", "classification", "events"]
-    """Kind of answer. For `events`, it is when something begins: detectors score frames, `alarms` makes alarms."""
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels that an estimator may use."""
     optional_features: tuple[ChannelKind, ...] = ()
     """Further kinds, used where a sensor has them."""
+    summaries: tuple[Summary, ...] = ()
+    """Numbers of each channel that are the features of a recording or of a frame."""
+    vote: Literal["frames"] | None = None
+    """Combination of frames to the answer for a recording: the commonest class, the first of equals, or the mean."""
+
+
+class TaskSpec(TaskFields):
+    """A task as data, which the core carries out."""
+
+    title: str
+    question: str
+    kind: Literal["regression", "classification", "events"]
+    """Kind of answer. For `events`, it is when something begins: detectors score frames, `alarms` makes alarms."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
     """Unit of an answer. `recording`: one class or number for each, by `summaries` and `features_by` or by `vote`;
     its label does not change within a recording. `frame`: one for each window of the target's length."""
-    summaries: tuple[Summary, ...] = ()
-    """Numbers of each channel that are the features of a recording or of a frame."""
     alarms: AlarmPolicy | None = None
     """Rules of alarms, for events."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
@@ -185,8 +194,6 @@ class TaskSpec(Frozen):
     features_by: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` for features of the task's own beside `summaries`, called with a recording as a tuple of
     :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording."""
-    vote: Literal["frames"] | None = None
-    """Combination of frames to the answer for a recording: the commonest class, the first of equals, or the mean."""
     metric: str
     """Name of the primary metric; see docs/glossary.md."""
     unit: str = "1"

@@ -34,16 +34,13 @@ def load_yaml(path: Path, model: type[M]) -> M:
     file = str(path)
     try:
         node, data = _loaded(path.read_text(encoding="utf-8"), file)
-    except OSError as error:
-        raise ConfigError(
-            file, None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
-        ) from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(file, None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", "") or "it is not UTF-8 text"
+        raise ConfigError(file, None, f"cannot be read: {reason}.", hint="Check the path and the file.") from error
     if node is None:
         raise ConfigError(file, None, "is empty.", hint="See docs/ for an example.")
     places: Places = {}
-    _look(node, (), places, file)
+    _collect_places(node, (), places, file)
     try:
         return model.model_validate(data)
     except ValidationError as error:
@@ -54,7 +51,7 @@ def plain_value(text: str) -> Any:
     """Return `text` as the number or truth value that YAML reads in it, and any other text as it is."""
     try:
         node, value = _loaded(text, "")
-        _look(node, (), {}, "")
+        _collect_places(node, (), {}, "")
     except ConfigError:
         return text
     return value if isinstance(value, str | int | float | bool) else text
@@ -74,7 +71,7 @@ def _loaded(text: str, file: str) -> tuple[Any, Any]:
         raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
 
 
-def _look(node: Any, at: Path_, places: Places, file: str) -> None:
+def _collect_places(node: Any, at: Path_, places: Places, file: str) -> None:
     """Add every key and item to `places`; raise ConfigError for a value that YAML reads as another than is written."""
     line = node.start_mark.line + 1
     places.setdefault(at, (line, node))
@@ -92,10 +89,10 @@ def _look(node: Any, at: Path_, places: Places, file: str) -> None:
             seen.add(key)
             place: Path_ = (*at, int(key) if number else key)
             places[place] = line, value_node
-            _look(value_node, place, places, file)
+            _collect_places(value_node, place, places, file)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
-            _look(item, (*at, index), places, file)
+            _collect_places(item, (*at, index), places, file)
     elif node.tag in (_INT, _FLOAT) and _ODD_NUMBER.match(node.value):
         written = node.value[:80]
         raise ConfigError(

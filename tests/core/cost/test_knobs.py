@@ -163,7 +163,7 @@ def test_a_setting_is_of_its_own_row_only():
 def cost_point(seconds, error, *, default=False, floor=0.3, subject="pad", family="newton"):
     return CostPoint(
         subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=floor, default=default, settings={"family": family},
+        floor=floor, default=default, rung="", settings={"family": family},
     )  # fmt: skip
 
 

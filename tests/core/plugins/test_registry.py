@@ -7,22 +7,25 @@ from importlib import metadata
 
 import pytest
 
-from tactbench.core.errors import DuplicateNameError, PluginError, UsageError
+from tactbench.core.errors import DuplicateNameError, PluginError, UnknownNameError, UsageError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import Owned, Registry, installed, load_object, load_registry
 from tactbench.plugin import RigDescriptor
+from tactbench.plugin.simulation import ranges
 from tests.core.matrix.plugin_packages import write_metadata
 
 HEAD = """
 from tactbench.plugin import *
 from tactbench.plugin.devices import DeviceDescriptor
+from tactbench.plugin.simulation import ranges
 from tactbench.tasks.force import SPEC as FORCE
 from tactbench.sensors.ideal import SPEC as IDEAL
 
 TACTBENCH_API = 2
 
 def sensor(name):
-    return SensorDescriptor(spec=IDEAL.model_copy(update={"name": name}))
+    stated = ranges(("taxel_white_count", 1.0, 2.0, "count", "assumed", "a test"))
+    return SensorDescriptor(spec=IDEAL.model_copy(update={"name": name, "ranges": stated}))
 """
 PAD = HEAD + '\n@hookimpl\ndef tactbench_sensors():\n    return [sensor("pad")]\n'
 EVERYTHING = (
@@ -108,7 +111,8 @@ def test_a_plugin_may_bring_every_kind_of_thing(site):
     assert registry.refused == []  # a sensor and a device may share a name
     owned = registry.sensors.owned("pad")
     assert (owned.module, owned.distribution, owned.version) == ("every_thing", "every-thing", "2.1")
-    ideal = installed().sensors["ideal"].spec.model_copy(update={"name": "pad"})
+    stated = ranges(("taxel_white_count", 1.0, 2.0, "count", "assumed", "a test"))
+    ideal = installed().sensors["ideal"].spec.model_copy(update={"name": "pad", "ranges": stated})
     assert owned.descriptor.spec == ideal, "a descriptor from a child process is the one that the plugin gave"
     guess = registry.estimators["guess"]
     assert (guess.params, guess.grid) == ({"a": 1, "b": (1.5, float("inf")), "c": None, "d": "x"}, {"a": (1, 2.5)})
@@ -152,6 +156,15 @@ def test_what_an_import_changes_changes_nothing_here(site):
     assert "patch" not in sys.modules
 
 
+def test_a_package_of_mappings_needs_no_hook(site):
+    (site.folder / "maps" / "datasets").mkdir(parents=True)
+    (site.folder / "maps" / "__init__.py").write_text("TACTBENCH_API = 2")
+    write_metadata(site.folder, "maps", "1", points="maps = maps")
+    assert site.load().failures
+    (site.folder / "maps" / "datasets" / "one.yaml").touch()
+    assert site.load().failures == []
+
+
 def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     more = PAD.replace('[sensor("pad")]', '[sensor("pad"), sensor("mat")]')
     registry = site.install("pad-maker", PAD).install("copycat", more).load()
@@ -159,6 +172,8 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
     assert registry.sensors.names() == ["mat"]
     with pytest.raises(DuplicateNameError, match=r"'pad'.*copycat.*pad-maker") as error:
         registry.sensors["pad"]  # it is known, and refused when it is asked for
+    with pytest.raises(UnknownNameError, match=r"'mad'.*'mat'"):
+        registry.sensors["mad"]
     assert [str(error.value)] == [str(refused) for refused in registry.refused]
 
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import RigError, UsageError
-from tactbench.core.plugins.rigs import failing_as
+from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.rigs import failing_as, load_rig_file
 from tests.conftest import Verbs
 
 
@@ -16,6 +17,13 @@ from tests.conftest import Verbs
 def test_what_code_of_a_rig_raises_is_an_error_of_the_rig_unless_it_is_one_of_ours(raised, expected):
     with pytest.raises(expected, match="boom"), failing_as("It could not be built"):
         raise raised
+
+
+@pytest.mark.parametrize(("stated", "physics"), [("", "twin"), ("emulation: {physics: other}", "other")])
+def test_emulated_devices_of_a_rig_file_sense_the_simulated_rig_unless_it_states_another(tmp_path, stated, physics):
+    path = tmp_path / "rig.yaml"
+    path.write_text(f"rig: bench\nsensors: {{icub: {{link: emulated}}}}\n{stated}\n", encoding="utf-8")
+    assert load_rig_file(path, installed()).emulation.physics == physics
 
 
 def recordings(verbs, out, *more, plugins=("patching",)):

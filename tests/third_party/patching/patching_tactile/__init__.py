@@ -39,25 +39,16 @@ def tactbench_indenters():
 @hookimpl
 def tactbench_tasks():
     profile = press_hold_release(peak=2, rise=1, dwell=1, release=0.1, rest=0, rate=20)
-    asked = {"title": "Nothing", "question": "How large is the force?", "kind": "regression", "unit": "N"}
-    how = {
-        "metric": "rmse",
-        "protocols": ("deployable",),
-        "splits": ("roles",),
-        "estimators": (),
-        "baselines": ("mean",),
-    }
-    found = []
     for what, naming in NAMING.items():
         scenes = tuple(
             PlannedScene(role=role, scene=Scene(name=f"{what}-{role}", session=role, profile=profile, **naming))
             for role in ("train", "test")
         )
-        target = ChannelTarget(kind="force", unit="N")
-        found.append(
-            TaskDescriptor(spec=TaskSpec(name=f"patching-{what}", target=target, scenes=scenes, **asked, **how))
-        )
-    return found
+        yield TaskDescriptor(spec=TaskSpec(
+            name=f"patching-{what}", title="Nothing", question="How large is the force?", kind="regression", unit="N",
+            target=ChannelTarget(kind="force", unit="N"), scenes=scenes, metric="rmse", protocols=("deployable",),
+            splits=("roles",), estimators=(), baselines=("mean",),
+        ))  # fmt: skip
 
 
 def bowl(x_mm, y_mm):
