@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import grids
 from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.rank import excess_of
 from tactbench.core.statistics.ranking import ranks
 from tactbench.core.statistics.replicates import (
     FEWEST,
@@ -144,6 +145,7 @@ def test_errors_of_force_are_compared_beyond_their_floor():
     own, others = (each["replicates"]["beyond"] for each in (one, other))
     assert one["replicates"]["excess"] == pytest.approx(np.square(own))
     assert found.value == pytest.approx(np.mean(own) - np.mean(others))
+    assert excess_of(one) == pytest.approx(np.median(one["replicates"]["excess"]))
 
 
 def test_five_have_their_range_and_eight_the_ends_of_the_published_formula():
