@@ -61,17 +61,6 @@ def test_collinear_taxels_have_one_set_of_fitted_values(tmp_path, protocol):
     assert scores[0] == pytest.approx(scores[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("protocol", RANKED)
-def test_rows_with_a_dropout_are_left_out_and_counted(tmp_path, protocol):
-    def dropped(_, X, __):
-        X[700:710, 0] = np.nan
-        X[720, 1] = np.inf
-
-    counts = scored(pressed(tmp_path, dropped), "ols", protocol).counts
-    assert counts["rows left out because t0 has no sample"] == 30
-    assert counts["rows left out because t1 has no sample"] == 3
-
-
 def test_a_rule_that_leaves_no_row_is_explained(tmp_path):
     rng = np.random.default_rng(0)
     paths = []

@@ -1,7 +1,6 @@
 """Events in time: frames on each stream's own clock, detectors, alarms and their figures, from recordings in files."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -90,12 +89,6 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     assert any("1000 Hz" in one for one in result.remarks)
 
 
-def test_answers_of_training_and_validation_are_kept_of_a_single_fold_alone(paths):
-    assert set(run(paths).sets) == {"validation", "test"}
-    by_session = run(paths, "force-ratio", split="session")
-    assert (set(by_session.sets), by_session.score) == ({"test"}, 1.0)
-
-
 def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
     assert run(paths, "force-ratio").score == 1.0
     for name in ("slip-never", "slip-always"):
@@ -169,15 +162,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     assert late[LATENCY] == pytest.approx(at_once[LATENCY] + spent_ms)
     same = ("events", "misses", "precision", "recall", RATE)
     assert [late[name] for name in same] == [at_once[name] for name in same]
-
-
-def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
-    asked = slip_state.SPEC.model_copy(update={"scenes": ()})
-    result = run(paths, "logistic", asked)
-    assert result.classes == ["stick", "incipient", "gross"]
-    assert result.score > 0.4  # a third is chance
-    scaled = [name.split() for name in result.scores if "thresholds" in name]
-    assert {(words[0], words[-1]) for words in scaled} == set(product(("balanced", "macro"), ("halved", "doubled")))
 
 
 def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):

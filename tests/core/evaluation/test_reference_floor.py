@@ -85,18 +85,6 @@ def result_of(folder, *, simulated=True, hold=7.2, samples=400, **how):
     return evaluated(force_task(protocols=("deployable",), splits=("roles",)), paths, split="roles")
 
 
-def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
-    result = result_of(tmp_path / "a", samples=4000)
-    assert result.reference_floor == pytest.approx(SIGMA, rel=0.1), "480 samples: 3.2 % standard error"
-    assert result.score == pytest.approx(SIGMA, rel=0.1)
-    assert result.true_score < 0.1, "the taxels know the force"
-    assert (result.beyond_floor_ci_low, result.beyond_floor_ci_high) == (None, None), "three recordings are too few"
-    squares, rows = np.sum(result.replicates["true"]["sums"], axis=0)
-    assert np.sqrt(squares / rows) == pytest.approx(result.true_score, rel=1e-9)
-    squares, freedom = np.sum(result.replicates["floor"], axis=0)
-    assert np.sqrt(squares / freedom) == pytest.approx(result.reference_floor, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("how", "why"),
     [({"hold": 0.0}, "no unloaded"), ({"drive": ForceLoop()}, "force loop"), ({"hold": 2.0}, f"than {FEWEST}")],
