@@ -7,8 +7,11 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.event_answers import Scored
 from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
+from tactbench.core.events.labels import SlipLabels
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
 from tactbench.core.spec.events import AREA_PER_MINUTE
@@ -131,7 +134,7 @@ def test_a_detector_that_alarms_at_no_threshold_that_is_allowed_is_scored_by_tho
     """Taps are louder than slips: one tap in 4 s is 15 a minute, of the 20 up to which the area goes."""
     for name, loud in (("heard", 3.0), ("silent", 1.0)):
         (tmp_path / name).mkdir()
-        result = run(campaign(tmp_path / name, loud=loud, tapped=5.0))
+        result = run(campaign(tmp_path / name, number=2, loud=loud, tapped=5.0))
         assert result.events["recall"] == 0
         assert never_alarms(result)
         assert result.score == pytest.approx(0.25 if name == "heard" else 0.0, abs=0.1)
@@ -151,6 +154,21 @@ def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_mis
     path = record(tmp_path / "blind.h5", slips=True, seed=1, reference=False)
     with pytest.raises(NotApplicable, match="'blind'"):
         load_dataset(TASK, [path])
+
+
+@pytest.mark.parametrize("friction", ["smooth", "0", "inf"])
+def test_a_coefficient_of_friction_is_a_number_above_zero(tmp_path, friction):
+    with pytest.raises(DataError, match=repr(friction)):
+        load_dataset(TASK, [record(tmp_path / "a.h5", slips=True, seed=1, friction=friction)])
+
+
+def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_from_the_first_frame_on():
+    t_ns, some = np.arange(4) * 10, np.zeros(4)
+    labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
+    reference = SlipReference(t_ns, some, some, some, {1.0: labels}, False)
+    assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
+    truth = Scored(0, np.array([20, 25, 30]), some[:3], reference).truth()
+    assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
 
 
 def test_compute_time_delays_alarms_and_changes_no_hit(paths):
