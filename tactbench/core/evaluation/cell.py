@@ -353,7 +353,7 @@ def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[
                 each.setdefault(name, {})[one.name] = float(value)
     chosen: dict[str, float] = {}
     for name, of in each.items():
-        values = set(of.values())
-        alike = len(of) == len(answered) and len(values) == 1
-        chosen |= {name: values.pop()} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
+        some = set(of.values())
+        alike = len(of) == len(answered) and len(some) == 1
+        chosen |= {name: some.pop()} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
     return chosen
