@@ -347,7 +347,7 @@ def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[
     for one in answered:
         values = {**one.choice.params, "k": one.choice.k} if one.choice else {}
         if rules is not None and rules.own_threshold is None:
-            values["threshold"] = one.detected[0].threshold
+            values["threshold"] = one.detected[0].thresholds[0]
         for name, value in values.items():
             if isinstance(value, int | float) and np.isfinite(value):
                 each.setdefault(name, {})[one.name] = float(value)
