@@ -78,10 +78,11 @@ def test_samples_that_a_faster_stream_lacks_are_left_out_of_it_and_counted(tmp_p
         features=("taxel", "ac_pressure"), answer_per="recording", splits=("shuffled",),
         summaries=(Summary(measure="mean"),),
     )  # fmt: skip
-    path = two_streams(tmp_path / "a.h5", (slow, slow), (fast, values), (slow, slow), labels={"kind": "a"})
+    lost = np.where(slow == 30, np.nan, slow)
+    path = two_streams(tmp_path / "a.h5", (slow, lost), (fast, values), (slow, slow), labels={"kind": "a"})
     data = load_dataset(whole, [path])
-    assert [n for text, n in data.counts.items() if "fast" in text] == [4]
-    assert [len(one.data) for one in data.tables[0].readings] == [10, 196]
+    assert {text.split()[2]: n for text, n in data.counts.items()} == {"fast": 4, "out": 1}
+    assert [(len(one.data), round(one.rate_hz)) for one in data.tables[0].readings] == [(9, 100), (196, 2000)]
 
 
 def test_flagged_samples_are_kept_and_counted(tmp_path):
