@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, peak_rss_mb, stated_delay_ms
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import load_registry
@@ -72,3 +72,7 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
         parts, remarks = reading_delay_ms(timeless)
         assert (parts, remarks) == ({}, (NO_RATE,))
     assert answer_delay_ms({**parts, "features": 0.1, "prediction": 0.1}, "features") is None
+
+
+def test_the_memory_of_this_process_is_in_megabytes():
+    assert 20 < peak_rss_mb() < 20_000

@@ -190,6 +190,12 @@ def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
     np.testing.assert_array_equal(found[0], found[1] == 2)
 
 
+@pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])
+def test_frames_are_windows_of_all_samples(paths, protocol):
+    with pytest.raises(NotApplicable, match=protocol):
+        run(paths, protocol=protocol)
+
+
 def test_code_for_features_must_give_a_line_a_frame(paths):
     wrong = REGISTRY.estimators["wavelet-energy"].model_copy(update={"frames_by": f"{__name__}:one_line"})
     with pytest.raises(PluginContractError, match=r"\(1, 1\)"):

@@ -72,6 +72,15 @@ def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path)
         run(task(), [changing])
 
 
+@pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])
+def test_summaries_are_of_all_samples(tmp_path, protocol):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"{role}.h5", rng.normal(size=(40, 2)), labels={"slip": "no"}, role=role, session=role)
+             for role in ("train", "validation", "test")]  # fmt: skip
+    with pytest.raises(NotApplicable, match=protocol):
+        run(task(splits=("roles",)), paths, "roles", "logistic", protocol)
+
+
 TWO = sensor_of(
     StreamSpec(name="taxels", channels=(ChannelSpec(name="t", kind="taxel"),)),
     StreamSpec(name="pac", channels=(ChannelSpec(name="p", kind="ac_pressure"),)),
