@@ -6,7 +6,7 @@ import pytest
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.evaluation.reference_floor import integrated_correlation
-from tests.core.evaluation.made import evaluated, force_task, label_task, record
+from tests.core.evaluation.made import evaluated, force_task, record
 
 ROLES = ("train", "validation", "test")
 RANKED = [name for name, protocol in PROTOCOLS.items() if not protocol.probe]
@@ -61,17 +61,6 @@ def test_collinear_taxels_have_one_set_of_fitted_values(tmp_path, protocol):
     assert scores[0] == pytest.approx(scores[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("protocol", RANKED)
-def test_rows_with_a_dropout_are_left_out_and_counted(tmp_path, protocol):
-    def dropped(_, X, __):
-        X[700:710, 0] = np.nan
-        X[720, 1] = np.inf
-
-    counts = scored(pressed(tmp_path, dropped), "ols", protocol).counts
-    assert counts["rows left out because t0 has no sample"] == 30
-    assert counts["rows left out because t1 has no sample"] == 3
-
-
 def test_a_rule_that_leaves_no_row_is_explained(tmp_path):
     rng = np.random.default_rng(0)
     paths = []
@@ -109,12 +98,3 @@ def test_the_correlation_of_a_reference_knows_no_unit(size):
     assert integrated_correlation(size * noise) == pytest.approx(integrated_correlation(noise))
     assert integrated_correlation(noise) > 5
     assert integrated_correlation(np.zeros(100)) == 1
-
-
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_one_class_to_learn_is_explained(tmp_path, protocol):
-    paths = [record(tmp_path / f"{role}.h5", np.random.default_rng(0).normal(0, 1, (700, 2)), role=role, session=role,
-                    labels={"kind": "a"}) for role in ROLES]  # fmt: skip
-    with pytest.raises(DataError, match="nothing to learn") as refused:
-        scored(paths, "majority", protocol, label_task())
-    assert refused.value.hint

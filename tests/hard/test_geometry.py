@@ -18,7 +18,7 @@ SHEET = SkinSheet(
 GRID = skin_grid(SHEET)
 INF = st.just(math.inf)
 FINGERS = st.one_of(INF, st.floats(4, 100))
-CAPS, PLACES, TILTS = st.floats(1, 1e9), st.floats(-9, 9), st.floats(-0.5, 0.5)
+CAPS, PLACES = st.floats(1, 1e9), st.floats(-9, 9)
 
 
 @given(
@@ -49,11 +49,3 @@ def test_a_larger_cap_is_nowhere_further_away(first, second, x, s, finger):
     there = far < small + BEYOND_MM
     # Rounding of gaps of up to a few finger radii.
     assert np.all(near[there] <= far[there] + 1e-12)
-
-
-@given(CAPS, PLACES, PLACES, TILTS, TILTS, FINGERS)
-def test_a_mirrored_indenter_has_a_mirrored_gap(radius, x, s, slope_x, slope_s, finger):
-    gap = gap_mm(GRID, Contact(radius, x, s, slope_x, slope_s), finger)
-    mirrored = gap_mm(GRID, Contact(radius, x, -s, slope_x, -slope_s), finger)
-    # The arc's cell centres are mirror images to rounding; a slope of the cap's flank of up to 22 magnifies it.
-    np.testing.assert_allclose(mirrored[:, ::-1], gap, atol=1e-9)

@@ -6,7 +6,7 @@ Regression, classification and events differ here in what of a fold is scored (:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, at_rows
 from tactbench.core.evaluation.delay import Clock
-from tactbench.core.evaluation.event_answers import Detected, EventRules
+from tactbench.core.evaluation.event_answers import EventRules, Scored
 from tactbench.core.evaluation.fitting import Build, Choice, answers_to, features_of, fit, select, voted
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.metrics import Metric
@@ -72,8 +72,8 @@ class AnsweredFold:
     predict_s: float
     batch_rows: int
     sets: Mapping[Role, Answers]
-    detected: tuple[Detected, ...] = ()
-    """test recordings of a task of events, all with the fold's threshold"""
+    detected: Sequence[Scored] = ()
+    """test recordings of a task of events, all with the fold's thresholds"""
 
 
 def fitted_fold(
@@ -132,14 +132,14 @@ def answered_fold(
     single = len(data.assignments) == 1
     if single and not made.classes:
         given["train"] = fold.train, answers_to(fold.train, fitted.model, descriptor, 0)
-    detected: tuple[Detected, ...] = ()
+    detected: Sequence[Scored] = ()
     if rules is None:
         sets: dict[Role, Answers] = {role: _rows(*one, made, number) for role, one in given.items()}
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
         curves = {role: rules.curve(several) for role, several in scored.items()}
-        threshold, bounds = rules.choose(curves.get("validation"))
-        detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
+        thresholds = rules.choose(curves.get("validation"))
+        detected = [one._replace(thresholds=thresholds) for one in scored["test"]]
         sets = {
             role: rules.items(several, curves[role], made, number)
             for role, several in scored.items()

@@ -347,12 +347,13 @@ def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[
     for one in answered:
         values = {**one.choice.params, "k": one.choice.k} if one.choice else {}
         if rules is not None and rules.own_threshold is None:
-            values["threshold"] = one.detected[0].threshold
+            values["threshold"] = one.detected[0].thresholds[0]
         for name, value in values.items():
             if isinstance(value, int | float) and np.isfinite(value):
                 each.setdefault(name, {})[one.name] = float(value)
     chosen: dict[str, float] = {}
     for name, of in each.items():
-        alike = len(of) == len(answered) and len(set(of.values())) == 1
-        chosen |= {name: of[answered[0].name]} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
+        some = set(of.values())
+        alike = len(of) == len(answered) and len(some) == 1
+        chosen |= {name: some.pop()} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
     return chosen

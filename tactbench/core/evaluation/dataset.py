@@ -72,7 +72,7 @@ class Table:
     apart: str = ""
     """Spans of the samples of features and target, if these never meet"""
 
-    def taken(self, rows: slice | IntArray) -> Table:
+    def taken(self, rows: slice | IntArray | Mask) -> Table:
         """Return some of its rows."""
         columns = {name: getattr(self, name) for name in ("X", "y", "labelled", "force", "time_s", "row")}
         kept: dict[str, Any] = {name: None if one is None else one[rows] for name, one in columns.items()}
@@ -195,8 +195,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
             f"No recording is left to evaluate{f': {why}' if why else ''}.",
             hint="See what was left out with `tactbench inspect`; --include-incomplete takes incomplete ones.",
         )
-    target = _target_name(task)
-    if not any(table.labelled.any() for table in tables):
+    target, labelled = _target_name(task), np.concatenate([table.labelled for table in tables])
+    if not labelled.any():
         apart = next((one for one in tables if one.apart), None)
         if apart is not None:
             raise DataError(
@@ -207,9 +207,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
             f"No recording has any {target}, which task {task.name!r} asks for.",
             hint="State it in the mapping, or choose another task.",
         )
-    unlabelled = sum(int((~table.labelled).sum()) for table in tables)
-    if unlabelled:
-        counts[f"of {sum(len(one.row) for one in tables)} rows have no {target} and were left out"] = unlabelled
+    if not labelled.all():
+        counts[f"of {len(labelled)} rows have no {target} and were left out"] = int((~labelled).sum())
     classes: tuple[Any, ...] = ()
     if task.kind == "classification" and task.answer_per != "frame":
         found = {value for table in tables for value in np.unique(table.y[table.labelled]).tolist()}
@@ -254,10 +253,10 @@ def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[
         apart = next((f" ({one.meta.name}: {one.apart})" for one in out if one.apart), "")
         yield f"{len(out)} of {len(tables)} recordings left out, without any {target}: {names}{apart}"
     there = [table for table in tables if table.labelled.any()]
-    rows = sum(table.rows for table in there)
+    rows, labelled = sum(table.rows for table in there), np.concatenate([table.labelled for table in there])
     missing = {
-        "a sample of each channel": rows - sum(len(table.row) for table in there),
-        f"a {target}": sum(int((~table.labelled).sum()) for table in there) if _channels_of(task) else 0,
+        "a sample of each channel": rows - len(labelled),
+        f"a {target}": int((~labelled).sum()) if _channels_of(task) else 0,
     }
     if sum(missing.values()) >= MUCH * rows:
         why = " and ".join(f"{count} without {what}" for what, count in missing.items() if count)
@@ -327,7 +326,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     reference = None
     if isinstance(task.target, SlipTarget):
         reference = slip_reference(recording, task.target, 0 if clock.t_ns is None else int(clock.t_ns[0]), counts)
-    whole = ~np.isnan(X).any(axis=1)
+    whole = np.asarray(~np.isnan(X).any(axis=1))
     for name, column in columns.items():
         if np.isnan(column).any():
             counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
@@ -335,19 +334,19 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     time_s = (clock.t_ns - clock.t_ns[0]) * 1e-9 if clock.t_ns is not None else row.astype(np.float64)
     table = Table(
         meta=meta,
-        X=X[whole],
-        y=y[whole],
-        labelled=labelled[whole],
-        force=None if force is None else force[whole],
-        time_s=time_s[whole],
-        row=row[whole],
+        X=X,
+        y=y,
+        labelled=labelled,
+        force=force,
+        time_s=time_s,
+        row=row,
         rows=len(row),
-        groups={name: column[whole] for name, column in _groups(meta, clock, task).items()},
+        groups=_groups(meta, clock, task),
         readings=tuple(own),
         reference=reference,
         apart=next(filter(None, (never_meeting(recording, one, clock) for one in targets)), ""),
     )
-    return tuple(columns), table
+    return tuple(columns), table.taken(whole)
 
 
 def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> None:

@@ -43,6 +43,8 @@ class Scored(NamedTuple):
     score: FloatArray
     """(n,) NaN: no answer"""
     reference: SlipReference
+    thresholds: tuple[float, ...] = ()
+    """of a test recording: its fold's, and those of `BOUNDS_PER_MINUTE` unless the detector has one of its own"""
 
     def truth(self, scale: float = 1.0) -> GroundTruth:
         """Return the events, under label thresholds times `scale`; none before the first frame counts."""
@@ -50,15 +52,6 @@ class Scored(NamedTuple):
         events = self.reference.labels[scale].gross_ns
         events = events[(events[:, 0] >= span[0]) & (events[:, 0] < span[1])]
         return GroundTruth(events, self.reference.disturbance, span)
-
-
-class Detected(NamedTuple):
-    """A test recording, and the thresholds of its alarms."""
-
-    scored: Scored
-    threshold: float
-    bounds: tuple[float, ...]
-    """The thresholds of `BOUNDS_PER_MINUTE`; empty where the detector has a threshold of its own"""
 
 
 @dataclass(frozen=True)
@@ -91,26 +84,26 @@ class EventRules:
             found.append(Scored(place, first + self.hop_ns * np.arange(n), whole, table.slip))
         return found
 
-    def choose(self, curve: ThresholdCurve | None) -> tuple[float, tuple[float, ...]]:
-        """Return the threshold of a fold, and those of all bounds; none of a detector with a threshold of its own."""
+    def choose(self, curve: ThresholdCurve | None) -> tuple[float, ...]:
+        """Return the threshold of a fold, then those of all bounds; of a detector that has a threshold this alone."""
         if self.own_threshold is not None:
-            return self.own_threshold, ()
-        curve = curve or threshold_curve([], self.policy)
+            return (self.own_threshold,)
+        curve, bounds = (
+            curve or threshold_curve([], self.policy),
+            (self.max_false_alarms_per_minute, *BOUNDS_PER_MINUTE),
+        )
         try:
-            chosen, *bounds = (
-                curve.operating_point(bound) for bound in (self.max_false_alarms_per_minute, *BOUNDS_PER_MINUTE)
-            )
+            return tuple(curve.operating_point(bound) for bound in bounds)
         except DataError as error:
             raise DataError(
                 "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
                 "alarms on.",
                 hint="Give validation recordings of both (label `event: disturbance`), or another split.",
             ) from error
-        return chosen, tuple(bounds)
 
-    def alarms(self, one: Scored, threshold: float) -> IntArray:
-        """Return when a recording's alarms are known, without the time that computing takes."""
-        return alarms(one.t_ns, one.score >= threshold, self.policy)
+    def alarms(self, one: Scored, number: int = 0) -> IntArray:
+        """Return when alarms at a threshold of a recording are known, without the time that computing takes."""
+        return alarms(one.t_ns, one.score >= one.thresholds[number], self.policy)
 
     def curve(self, several: Sequence[Scored]) -> ThresholdCurve:
         """Return the curve of recordings; that of a detector with a threshold of its own has this one point."""
@@ -151,7 +144,7 @@ class EventRules:
         none, number = np.full(len(true), np.nan), np.full(len(true), fold, dtype=np.int64)
         return Answers(true, hits, place, row, number, np.asarray(at_ns * 1e-9, dtype=np.float64), none)
 
-    def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
+    def figures(self, tested: Sequence[Scored], compute_s: float | None) -> dict[str, float]:
         """Return figures of the events of all test recordings, without those that are undefined.
 
         Parameters
@@ -161,9 +154,9 @@ class EventRules:
         """
         late_s = compute_s or 0.0
         moved = []
-        for one, threshold, _ in tested:
+        for one in tested:
             onset = one.truth().event_ns[:, 0]
-            late = latency_s(onset, self.alarms(one, threshold), self.policy) + late_s
+            late = latency_s(onset, self.alarms(one), self.policy) + late_s
             moved.append(displacement_at_detection(onset, late, one.reference.t_ns, one.reference.displacement_m))
         displacement = np.concatenate(moved)
         displacement = displacement[np.isfinite(displacement)]
@@ -182,24 +175,24 @@ class EventRules:
             **_frame_scores(tested),
         }
         for scale, text in OTHER_SCALES.items():
-            if all(scale in one.scored.reference.labels for one in tested):
-                found[f"F1 with label thresholds {text}"] = float(self._scores(tested, scale).f1)
+            if all(scale in one.reference.labels for one in tested):
+                found[f"F1 with label thresholds {text}"] = float(self._scores(tested, scale=scale).f1)
         if compute_s is not None:
             found["compute s per s of signal"] = 1e9 * compute_s / self.hop_ns
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
-    def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> list[dict[str, float]]:
+    def operating_points(self, tested: Sequence[Scored], compute_s: float | None) -> list[dict[str, float]]:
         """Return figures of test recordings at thresholds chosen on validation for several bounds of false alarms."""
         found = []
-        for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else ()):
-            scores = self._scores([one._replace(threshold=one.bounds[number]) for one in tested])
+        for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else (), 1):
+            scores = self._scores(tested, number)
             point = {"bound": bound, "f1": float(scores.f1), **_hits(scores, compute_s or 0.0)}
             found.append({name: value for name, value in point.items() if np.isfinite(value)})
         return found
 
-    def _scores(self, tested: Sequence[Detected], scale: float = 1.0) -> EventScores:
-        truths = [one.scored.truth(scale) for one in tested]
-        return score_events(truths, [self.alarms(one, threshold) for one, threshold, _ in tested], self.policy)
+    def _scores(self, tested: Sequence[Scored], number: int = 0, scale: float = 1.0) -> EventScores:
+        alarms_ns = [self.alarms(one, number) for one in tested]
+        return score_events([one.truth(scale) for one in tested], alarms_ns, self.policy)
 
 
 def _hits(scores: EventScores, late_s: float) -> dict[str, float]:
@@ -210,13 +203,13 @@ def _hits(scores: EventScores, late_s: float) -> dict[str, float]:
     }
 
 
-def _frame_scores(tested: Sequence[Detected]) -> dict[str, float]:
+def _frame_scores(tested: Sequence[Scored]) -> dict[str, float]:
     """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
     pairs = []
     for one in tested:
-        state = one.scored.reference.state(one.scored.t_ns)
-        known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
-        pairs.append((state[known] == GROSS, one.scored.score[known] >= one.threshold))
+        state = one.reference.state(one.t_ns)
+        known = (state != UNDECIDED) & ~np.isnan(one.score)
+        pairs.append((state[known] == GROSS, one.score[known] >= one.thresholds[0]))
     return _scores_of(pairs, 2, "frame {}")
 
 

@@ -65,9 +65,9 @@ def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
 _squares = _mean_of(np.square)
 
 
-def distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
-    """Return the (n,) Euclidean lengths of the differences of (n, components)."""
-    return np.asarray(np.linalg.norm(predicted - y, axis=1))
+def lengths(vectors: npt.NDArray[Any]) -> FloatArray:
+    """Return the (n,) Euclidean lengths of (n, components)."""
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _explained(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
@@ -109,8 +109,7 @@ def class_f1(sums: FloatArray, n_classes: int) -> FloatArray:
     """Return (…, classes) F1 of each class; 0 for a class that is neither there nor predicted, as in scikit-learn."""
     table = confusion(sums, n_classes)
     hit = np.diagonal(table, axis1=-2, axis2=-1)
-    both = table.sum(axis=-1) + table.sum(axis=-2)
-    return np.asarray(np.divide(2 * hit, both, out=np.zeros_like(both), where=both > 0))
+    return np.asarray(2 * hit / np.maximum(table.sum(axis=-1) + table.sum(axis=-2), 1))
 
 
 def _macro_f1(sums: FloatArray, n_classes: int) -> FloatArray:
@@ -122,8 +121,7 @@ def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
     table = confusion(sums, n_classes)
     there = table.sum(axis=-1)
     hit = np.diagonal(table, axis1=-2, axis2=-1)
-    recall = np.divide(hit, there, out=np.zeros_like(there), where=there > 0)
-    return np.asarray(recall.sum(axis=-1) / (there > 0).sum(axis=-1))
+    return np.asarray((hit / np.maximum(there, 1)).sum(axis=-1) / (there > 0).sum(axis=-1))
 
 
 def _of_events(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
@@ -136,7 +134,7 @@ METRICS = {
     for metric in (
         Metric("rmse", "regression", _squares, _rmse),
         Metric("mae", "regression", _mean_of(np.abs), ratio),
-        Metric(VECTOR_METRIC, "regression", _mean_of(lambda d: np.linalg.norm(d, axis=1)), ratio, vector=True),
+        Metric(VECTOR_METRIC, "regression", _mean_of(lengths), ratio, vector=True),
         Metric("r2", "regression", _explained, _r2),
         Metric("accuracy", "classification", _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", _pairs, _balanced),
@@ -171,7 +169,7 @@ def metric_called(name: str) -> Metric:
 
 def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
     """Return percentiles of the error over all rows, and each component's own RMSE."""
-    error = distances(y, predicted)
+    error = lengths(predicted - y)
     squares = np.mean((predicted - y) ** 2, axis=0)
     return {
         MEDIAN_ERROR: float(np.median(error)),

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.interval import Interval, ReplicateUnits, influences, student_quantile
-from tactbench.core.evaluation.metrics import Metric, ratio
+from tactbench.core.evaluation.metrics import EXCESS, Metric, ratio
 from tactbench.core.evaluation.sets import hold_s, unloaded
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
@@ -122,9 +122,9 @@ def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> tuple[f
     excess = float(loss.mean() - floor.square)
     if not unit.enough(tested.y_true, 0):
         return _root(excess), Interval()
-    sums = unit.sums(np.column_stack([loss, np.ones(len(loss))]))
     held = floor.by_replicate(tested, unit.codes)
-    without = ratio(sums.sum(axis=0) - sums) - ratio(held.sum(axis=0) - held)
+    sums = np.column_stack([unit.sums(np.column_stack([loss, np.ones(len(loss))])), held])
+    without = EXCESS.score(sums.sum(axis=0) - sums, 0)
     carried = influences(without, np.zeros(len(sums), dtype=np.int64))
     reach = float(student_quantile(len(sums) - 1)) * float(np.sqrt(carried @ carried))
     return _root(excess), Interval(_root(excess - reach), _root(excess + reach))

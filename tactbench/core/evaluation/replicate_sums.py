@@ -62,7 +62,7 @@ def summed(
     def against(y: npt.NDArray[Any]) -> dict[str, Any]:
         sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))
         # Counts are written as whole numbers; all else keeps every digit.
-        lines = [[int(one) if one.is_integer() and abs(one) < 2**53 else one for one in line] for line in sums.tolist()]
+        lines = [[int(one) if one.is_integer() else one for one in line] for line in sums.tolist()]
         if n_classes:
             lines = [[value for place in np.flatnonzero(line) for value in (int(place), line[place])] for line in lines]
         return {"sums": lines, "own": _plain(own_scores(metric, sums, n_classes))}

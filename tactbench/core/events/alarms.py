@@ -193,8 +193,7 @@ def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], p
         n_alarms += alarm_ns.size
         n_false += int(counted.sum())
         base_ns += length_ns
-    latency = np.concatenate(latencies) if latencies else np.zeros(0)
-    return EventScores(np.asarray(n_alarms), np.asarray(n_false), base_ns, latency)
+    return EventScores(np.asarray(n_alarms), np.asarray(n_false), base_ns, np.concatenate([[], *latencies]))
 
 
 def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> FloatArray:

@@ -262,7 +262,6 @@ class FoldDifference:
     low: float
     high: float
     p: float
-    folds: int
     method: str
 
 
@@ -285,9 +284,8 @@ def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDif
     mean = float(d.mean())
     reach = float(student_quantile(n - 1)) * deviation
     p = two_sided_p(mean / deviation, n - 1) if deviation > 0 else float(mean == 0)
-    return FoldDifference(
-        mean, mean - reach, mean + reach, p, n, f"corrected resampled t (Nadeau and Bengio) over {n} folds"
-    )
+    method = f"corrected resampled t (Nadeau and Bengio) over {n} folds"
+    return FoldDifference(mean, mean - reach, mean + reach, p, method)
 
 
 def over_folds(first: Row, second: Row) -> FoldDifference | None:

@@ -21,8 +21,6 @@ class Rank:
     """worst place that it holds"""
     tied: bool
     """another cell has the same place"""
-    apart: bool = False
-    """clearly worse than the cell next before it"""
     behind: bool = False
     """clearly worse than the cell with the best score"""
 

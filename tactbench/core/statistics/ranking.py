@@ -52,25 +52,21 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     entered.sort(key=lambda row: (-sign * row["score"], row["cell"]))
     error = -sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
     groups = together(entered)
-    better, worse, places, apart, behind = _clearly(entered, groups, error)
+    clear, places = _clearly(entered, groups, error)
+    better, worse = clear.sum(axis=1), clear.sum(axis=0)
     low = np.minimum(1 + better, places)
     high = np.maximum(len(entered) - worse, places)
     many = np.bincount(places)
     return {
-        row["cell"]: Rank(int(places[i]), int(low[i]), int(high[i]), bool(many[places[i]] > 1), bool(apart[i]),
-                          bool(behind[i]))
+        row["cell"]: Rank(int(places[i]), int(low[i]), int(high[i]), bool(many[places[i]] > 1), bool(clear[i, 0]))
         for i, row in enumerate(entered)
-    }  # fmt: skip
+    }
 
 
 def _clearly(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
-) -> tuple[IntArray, IntArray, IntArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return (n,) arrays from which ranks follow, of cells in order of their errors.
-
-    How many are clearly better and how many clearly worse, the place, and whether it is clearly worse than the cell
-    before and than the first.
-    """
+) -> tuple[npt.NDArray[np.bool_], IntArray]:
+    """Return (n, n) whether a cell is clearly worse than another, and (n,) places, in order of errors."""
     n = len(rows)
     mean, deviation, freedom = _differed(rows, groups, error)
     distinct, which = np.unique(freedom, return_inverse=True)
@@ -93,8 +89,7 @@ def _clearly(
         if clear[place, first:place].all():
             first = place
         places[place] = first + 1
-    apart = np.concatenate([[False], np.diagonal(clear, -1)])
-    return clear.sum(axis=1), clear.sum(axis=0), places, apart, clear[:, 0]
+    return clear, places
 
 
 def _differed(

@@ -22,13 +22,13 @@ def clock(rate_hz, length_s=END_S):
     return np.round(np.arange(0.0, length_s, 1 / rate_hz) * 1e9).astype(np.int64)
 
 
-def record(path, *, slips, seed, vibration=True, reference=True, loud=5.0, tapped=1.0, **meta):
+def record(path, *, slips, seed, vibration=True, reference=True, loud=5.0, tapped=1.0, friction=0.5, **meta):
     """Write a recording that slips at 10 mm/s from 2 s on, or is tapped at 3 s.
 
     Vibration rises `loud`-fold while it slips, `tapped`-fold for 0.2 s when it is tapped.
     """
     rng = np.random.default_rng(seed)
-    labels = {"event": "slip" if slips else "disturbance", "friction_coefficient": 0.5}
+    labels = {"event": "slip" if slips else "disturbance", "friction_coefficient": friction}
     blocks = []
     for stream in sensor(vibration).streams:
         t_ns = clock(stream.rate_hz)

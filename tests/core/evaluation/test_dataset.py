@@ -71,17 +71,25 @@ def test_an_answer_from_the_time_alone_needs_a_clock(tmp_path):
         evaluated(force_task(), untimed, "time-index", split="session")
 
 
+WHOLE = label_task(answer_per="recording", splits=("shuffled",), summaries=(Summary(measure="mean"),))
+
+
+@pytest.mark.parametrize(("n", "t_ns", "rate_hz"), [(1, "regular", None), (2, "regular", 100.0), (5, None, None)])
+def test_the_rate_of_a_stream_is_that_of_its_clock(tmp_path, n, t_ns, rate_hz):
+    path = record(tmp_path / "a.h5", np.ones((n, 2)), labels={"kind": "a"}, t_ns=t_ns)
+    (readings,) = load_dataset(WHOLE, [path]).tables[0].readings
+    assert readings.rate_hz == rate_hz
+
+
 def test_samples_that_a_faster_stream_lacks_are_left_out_of_it_and_counted(tmp_path):
     slow, fast = np.arange(0.0, 100.0, 10.0), np.arange(0.0, 100.0, 0.5)
     values = np.where(np.arange(200) % 50 == 7, np.nan, fast)
-    whole = label_task(
-        features=("taxel", "ac_pressure"), answer_per="recording", splits=("shuffled",),
-        summaries=(Summary(measure="mean"),),
-    )  # fmt: skip
-    path = two_streams(tmp_path / "a.h5", (slow, slow), (fast, values), (slow, slow), labels={"kind": "a"})
-    data = load_dataset(whole, [path])
-    assert [n for text, n in data.counts.items() if "fast" in text] == [4]
-    assert [len(one.data) for one in data.tables[0].readings] == [10, 196]
+    both = WHOLE.model_copy(update={"features": ("taxel", "ac_pressure")})
+    lost = np.where(slow == 30, np.nan, slow)
+    path = two_streams(tmp_path / "a.h5", (slow, lost), (fast, values), (slow, slow), labels={"kind": "a"})
+    data = load_dataset(both, [path])
+    assert {text.split()[2]: n for text, n in data.counts.items()} == {"fast": 4, "out": 1}
+    assert [(len(one.data), round(one.rate_hz)) for one in data.tables[0].readings] == [(9, 100), (196, 2000)]
 
 
 def test_flagged_samples_are_kept_and_counted(tmp_path):

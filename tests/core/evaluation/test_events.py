@@ -1,15 +1,17 @@
 """Events in time: frames on each stream's own clock, detectors, alarms and their figures, from recordings in files."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.event_answers import Scored
 from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
+from tactbench.core.events.labels import SlipLabels
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
 from tactbench.core.spec.events import AREA_PER_MINUTE
@@ -90,12 +92,6 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     assert any("1000 Hz" in one for one in result.remarks)
 
 
-def test_answers_of_training_and_validation_are_kept_of_a_single_fold_alone(paths):
-    assert set(run(paths).sets) == {"validation", "test"}
-    by_session = run(paths, "force-ratio", split="session")
-    assert (set(by_session.sets), by_session.score) == ({"test"}, 1.0)
-
-
 def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
     assert run(paths, "force-ratio").score == 1.0
     for name in ("slip-never", "slip-always"):
@@ -138,7 +134,7 @@ def test_a_detector_that_alarms_at_no_threshold_that_is_allowed_is_scored_by_tho
     """Taps are louder than slips: one tap in 4 s is 15 a minute, of the 20 up to which the area goes."""
     for name, loud in (("heard", 3.0), ("silent", 1.0)):
         (tmp_path / name).mkdir()
-        result = run(campaign(tmp_path / name, loud=loud, tapped=5.0))
+        result = run(campaign(tmp_path / name, number=2, loud=loud, tapped=5.0))
         assert result.events["recall"] == 0
         assert never_alarms(result)
         assert result.score == pytest.approx(0.25 if name == "heard" else 0.0, abs=0.1)
@@ -160,6 +156,21 @@ def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_mis
         load_dataset(TASK, [path])
 
 
+@pytest.mark.parametrize("friction", ["smooth", "0", "inf"])
+def test_a_coefficient_of_friction_is_a_number_above_zero(tmp_path, friction):
+    with pytest.raises(DataError, match=repr(friction)):
+        load_dataset(TASK, [record(tmp_path / "a.h5", slips=True, seed=1, friction=friction)])
+
+
+def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_from_the_first_frame_on():
+    t_ns, some = np.arange(4) * 10, np.zeros(4)
+    labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
+    reference = SlipReference(t_ns, some, some, some, {1.0: labels}, False)
+    assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
+    truth = Scored(0, np.array([20, 25, 30]), some[:3], reference).truth()
+    assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
+
+
 def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     at_once, timed = run(paths).events, run(paths, latency=True)
     parts, late = timed.delay_parts_ms, timed.events
@@ -171,21 +182,18 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     assert [late[name] for name in same] == [at_once[name] for name in same]
 
 
-def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
-    asked = slip_state.SPEC.model_copy(update={"scenes": ()})
-    result = run(paths, "logistic", asked)
-    assert result.classes == ["stick", "incipient", "gross"]
-    assert result.score > 0.4  # a third is chance
-    scaled = [name.split() for name in result.scores if "thresholds" in name]
-    assert {(words[0], words[-1]) for words in scaled} == set(product(("balanced", "macro"), ("halved", "doubled")))
-
-
 def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
     states = slip_state.SPEC.model_copy(update={"scenes": (), "target": TASK.target})
     found = [framed(load_dataset(task, paths[:1]), task, RULES, REGISTRY.estimators["slip-forest"]).tables[0].y
              for task in (TASK, states)]  # fmt: skip
     assert set(found[1]) == {0, 1, 2}
     np.testing.assert_array_equal(found[0], found[1] == 2)
+
+
+@pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])
+def test_frames_are_windows_of_all_samples(paths, protocol):
+    with pytest.raises(NotApplicable, match=protocol):
+        run(paths, protocol=protocol)
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):

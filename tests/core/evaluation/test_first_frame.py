@@ -23,7 +23,7 @@ def grasps(folder, offset):
 
 
 def run(paths, protocol="first-frame", split=None, task=TASK):
-    return evaluated(task, paths, "forest", protocol, split, params={"n_estimators": 10})
+    return evaluated(task, paths, "logistic", protocol, split)
 
 
 def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_path_factory):

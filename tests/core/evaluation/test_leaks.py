@@ -59,10 +59,10 @@ def test_single_rows_of_one_place_that_stand_in_another_one_again(tmp_path, repe
 
 
 def test_recordings_of_one_row_each_that_are_there_twice(tmp_path):
-    X, force = ramp(1, n=20)
-    rows = [record(tmp_path / f"{n}.h5", X[[n % 20]], force[[n % 20]], session=str(n // 10)) for n in range(40)]
+    X, force = ramp(1, n=10)
+    rows = [record(tmp_path / f"{n}.h5", X[[n % 10]], force[[n % 10]], session=str(n // 5)) for n in range(20)]
     assert evaluated(force_task(), rows, split="session").stamps[0].startswith("leaks: ")
-    assert evaluated(force_task(), rows[:20], split="session").stamps == []
+    assert evaluated(force_task(), rows[:10], split="session").stamps == []
 
 
 COARSE = {

@@ -49,6 +49,13 @@ def test_fewer_than_five_units_or_of_a_class_have_no_interval():
     assert interval(kind, kind, cluster, "accuracy", 2).low is None, "two units alone hold the second class"
 
 
+def test_units_whose_own_score_is_undefined_do_not_count():
+    unit, error = np.arange(600) // 100, np.random.default_rng(0).normal(size=600)
+    for undefined, some in ((1, True), (2, False)):
+        y = np.tile([-1.0, 1.0], 300) * (unit >= undefined)
+        assert (interval(y, y + 0.1 * error, unit, "r2").low is not None) == some
+
+
 def test_an_error_that_few_units_do_not_bound_is_open_above():
     error = np.repeat([0.0, 0.0, 0.0, 0.0, 1.0], 20)
     assert interval(0 * error, error, np.repeat(np.arange(5), 20)).high is None

@@ -49,20 +49,6 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     assert any("deviation, mean-step" in one for one in result.remarks)
 
 
-def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
-    paths = sequences(tmp_path, number=8)
-    whole = run(task(), paths, estimator="logistic", latency=True)
-    assert whole.delay_parts_ms["features"] > 0
-    assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
-    part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
-    half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    votes = task(summaries=(), vote="frames")
-    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (votes, 390.0)):
-        parts = run(asked, paths, estimator="logistic").delay_parts_ms
-        assert parts["window"] == pytest.approx(window_ms)
-    assert "window" not in run(task(), paths, estimator="majority").delay_parts_ms
-
-
 def test_splits_keep_recordings_whole(tmp_path):
     paths = sequences(tmp_path)
     data = load_dataset(task(), paths)
@@ -84,6 +70,15 @@ def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path)
     changing = record(tmp_path / "c.h5", np.ones((40, 2)), annotations=halves)
     with pytest.raises(NotApplicable, match=r"'slip'.*'c'"):
         run(task(), [changing])
+
+
+@pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])
+def test_summaries_are_of_all_samples(tmp_path, protocol):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"{role}.h5", rng.normal(size=(40, 2)), labels={"slip": "no"}, role=role, session=role)
+             for role in ("train", "validation", "test")]  # fmt: skip
+    with pytest.raises(NotApplicable, match=protocol):
+        run(task(splits=("roles",)), paths, "roles", "logistic", protocol)
 
 
 TWO = sensor_of(

@@ -104,6 +104,7 @@ def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
     for split, tested in (("object", 0), ("roles", 1)):
         result = evaluated(label_task(), paths, "logistic", split=split)
         assert set(result.sets["test"].recording.tolist()) == {tested}
+        assert [n for text, n in result.counts.items() if "no part" in text] == [1] * (split == "object")
 
 
 def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import Quality
 from tactbench.plugin import Block, ChannelSpec, ChannelTarget, StreamSpec, VectorTarget
@@ -56,13 +55,3 @@ def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estima
     for column, name in enumerate(("x", "y")):
         alone = place_task(target=ChannelTarget(kind="position", name=name, unit="mm"), metric="rmse")
         np.testing.assert_array_equal(both[:, column], answered(alone))
-
-
-def test_rows_without_a_component_have_no_label_and_intervals_and_replicates_are_of_the_vectors(tmp_path):
-    result = run(place_task(), presses(tmp_path, missing=15))
-    assert result.n_test == 6 * 45
-    assert [n for text, n in result.counts.items() if "'x' and 'y'" in text] == [12 * 15]
-    assert "6 sessions" in result.ci_method
-    assert result.ci_low < result.score < result.ci_high
-    sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)
-    assert sums[0] / sums[1] == pytest.approx(result.score)

@@ -1,13 +1,14 @@
-"""Alarms against a detector that sees one frame at a time; their matching against mir_eval."""
+"""Alarms against a detector that sees one frame at a time, their matching against mir_eval, and scores by hand."""
 
 import mir_eval
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.events.alarms import alarms, match
+from tactbench.core.events.alarms import alarms, displacement_at_detection, match, score_events, time_base
 from tactbench.core.spec.events import nanoseconds
-from tests.core.events.made import MS, clocks, policies, policy
+from tests.core.events.made import MS, clocks, policies, policy, seconds, truth, truths
 
 
 @st.composite
@@ -66,3 +67,65 @@ def test_as_many_pairs_as_mir_eval_on_ten_thousand_random_cases():
 def test_of_two_alarms_on_one_event_the_first_is_the_hit():
     events, hits = match(np.array([100 * MS]), np.array([160 * MS, 120 * MS]), policy())
     assert (events.tolist(), hits.tolist()) == ([0], [1])
+
+
+def test_an_alarm_ten_seconds_after_the_event_is_false_whatever_the_defaults_of_others_say():
+    """With its defaults, timescoring 0.0.7 says F1 = 1 and no false alarm."""
+    event, raised = truth([(100.0, 110.0)], span=(0.0, 600.0)), seconds(95.0, 101.0, 108.0, 120.0)
+    scores = score_events([event], [raised], policy(before=0.5, after=2.0))
+    assert (scores.n_hits, scores.n_alarms, scores.f1) == (1, 4, pytest.approx(0.4))
+    # 95 s and 120 s; that at 108 s lies in the event, which is no time to count false alarms on.
+    assert scores.n_false_alarms == 2
+    assert scores.false_alarms_per_minute == pytest.approx(2 / ((600 - 10.5) / 60), rel=1e-9)
+
+
+def test_counts_and_latencies_by_hand():
+    first, second = truth([(10.0, 12.0), (30.0, 31.0)]), truth([(5.0, 6.0)], disturbance=True, span=(0.0, 30.0))
+    rules = policy(before=0.05, after=0.2, time="disturbances")
+    scores = score_events([first, second], [seconds(2.0, 9.98, 10.1, 30.15, 50.0), seconds(5.5, 21.0, 22.0)], rules)
+    assert np.array_equal(scores.latency_s, [-0.02, 0.15, np.nan], equal_nan=True)
+    assert (scores.n_hits, scores.n_misses, scores.n_alarms, scores.n_false_alarms) == (2, 1, 8, 2)
+    assert (scores.precision, scores.recall) == (2 / 8, 2 / 3)
+    assert scores.f1 == 4 / 11
+    # 30 s less the event with its window; the window's last nanosecond belongs to the window.
+    assert scores.base_ns == 30_000_000_000 - 1_050_000_001
+    assert scores.latency_percentile_s(50) == pytest.approx(0.065)
+
+
+def test_what_cannot_be_said_is_nan_and_no_number():
+    nothing = score_events([truth(span=(0.0, 0.0))], [seconds()], policy())
+    undefined = (nothing.precision, nothing.recall, nothing.f1, nothing.false_alarms_per_minute)
+    assert all(np.isnan(value) for value in undefined)
+    assert np.isnan(nothing.latency_percentile_s(50))
+    missed = score_events([truth([(10.0, 12.0)])], [seconds()], policy())
+    assert np.isnan(missed.precision)
+    assert (missed.recall, missed.f1, missed.false_alarms_per_minute) == (0.0, 0.0, 0.0)
+
+
+@given(truths, policies)
+def test_the_time_base_holds_what_its_definition_says_millisecond_by_millisecond(truth_of, rules):
+    clock = np.arange(-5, 100, dtype=np.int64) * MS
+    expected = []
+    for now in clock.tolist():
+        in_span = truth_of.span_ns[0] <= now < truth_of.span_ns[1]
+        named = in_span and (truth_of.disturbance or rules.false_alarm_time == "non-events")
+        taken = any(
+            onset - nanoseconds(rules.window_before_s) <= now <= max(onset + nanoseconds(rules.window_after_s), end)
+            for onset, end in truth_of.event_ns.tolist()
+        )
+        expected.append(named and not taken)
+    held, length_ns = time_base(truth_of, rules, clock)
+    assert np.array_equal(held, expected)
+    # Its length is the number of held milliseconds but for the ends of events, which hold one nanosecond more.
+    assert abs(length_ns - sum(expected) * MS) <= MS * len(truth_of.event_ns)
+
+
+def test_displacement_at_detection_is_what_the_surface_moved_since_the_onset():
+    clock = seconds(0.0, 1.0, 2.0, 3.0)
+    displacement = np.array([0.0, 0.0, 0.010, 0.030])
+    onset = seconds(1.0, 1.0, 1.0, 2.5, 1.0)
+    late = np.array([0.5, -0.5, 1.5, 1.0, np.nan])
+    moved = displacement_at_detection(onset, late, clock, displacement)
+    assert moved == pytest.approx([0.005, 0.0, 0.020, np.nan, np.nan], nan_ok=True)
+    later = displacement_at_detection(onset + 7 * 10**9, late, clock + 7 * 10**9, displacement)
+    np.testing.assert_array_equal(later, moved)

@@ -38,6 +38,13 @@ def test_other_replicates_are_not_paired():
     assert apart.high - apart.value == pytest.approx(stats.t.ppf(0.975, 6) * deviation, rel=1e-9)
 
 
+def scored(cell, scores, **more):
+    """Return a row whose replicates have scores of their own."""
+    made = mae_row(cell, scores, **more)
+    made["replicates"]["scores"] = scores.tolist()
+    return made
+
+
 @pytest.mark.parametrize(
     ("shift", "same", "verdict", "beyond"),
     [
@@ -60,6 +67,32 @@ def test_equal_answers_are_equivalent_only_where_a_region_is_stated():
     for same, verdict in ((None, "undecided"), (0.1, "equivalent")):
         found = difference(mae_row("a", B, equivalence=same), mae_row("b", B, equivalence=same))
         assert (found.value, found.low, found.high, found.verdict) == (0.0, 0.0, 0.0, verdict)
+        assert (found.effect, found.improved) == (None, 0.5)
+    exact = np.arange(8) / 8
+    for shift in (0.5, -0.5):
+        found = difference(scored("a", exact, equivalence=0.5), scored("b", exact + shift, equivalence=0.5))
+        assert (found.value, found.verdict, found.beyond) == (-shift, "equivalent", False), "its edge is within it"
+
+
+def test_replicates_that_are_all_alike_have_no_spread_to_compare_with():
+    found = difference(mae_row("a", [1.0] * 7), mae_row("b", [2.0] * 7, names="tuvwxyz"))
+    assert (found.p, found.smallest_p, found.effect, found.paired) == (None, None, None, False)
+
+
+@pytest.mark.parametrize("n", [7, 30])
+def test_scores_of_replicates_themselves_are_exchanged_too(n):
+    """All ways of seven; of thirty 9,999 are drawn, and what was observed is counted among them."""
+    rng = np.random.default_rng(n)
+    a, b = rng.normal(1.0, 0.3, (2, n))
+    for shift in (0.0, 10.0):
+        found = difference(scored("a", a + shift), scored("b", b))
+        known = stats.permutation_test(
+            (a + shift, b), lambda x, y, axis: np.mean(x - y, axis=axis), permutation_type="samples", vectorized=True,
+            n_resamples=9999, rng=0,
+        )  # fmt: skip
+        assert found.p == pytest.approx(known.pvalue, abs=1e-12 if n == 7 else 0.02)
+        assert found.smallest_p == (2 / 2**7 if n == 7 else 1 / 10_000)
+    assert found.p == found.smallest_p
 
 
 @settings(max_examples=40, deadline=None)

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import grids
 from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.rank import excess_of
 from tactbench.core.statistics.ranking import ranks
 from tactbench.core.statistics.replicates import (
     FEWEST,
@@ -144,6 +143,7 @@ def test_errors_of_force_are_compared_beyond_their_floor():
     own, others = (each["replicates"]["beyond"] for each in (one, other))
     assert one["replicates"]["excess"] == pytest.approx(np.square(own))
     assert found.value == pytest.approx(np.mean(own) - np.mean(others))
+    assert excess_of(one) == pytest.approx(np.median(one["replicates"]["excess"]))
 
 
 def test_five_have_their_range_and_eight_the_ends_of_the_published_formula():
@@ -208,10 +208,6 @@ def test_a_better_answer_by_the_true_force_is_first_where_the_noise_of_the_refer
     assert {one: rank.place for one, rank in ranks([better, worse]).items()} == {better["cell"]: 1, worse["cell"]: 2}
     apart = difference(better, worse)
     assert (apart.verdict, apart.value) == ("better", pytest.approx(-0.03))
-    table = build_table([better, worse, found["mean"]])
-    assert [line.row["estimator"] for line in table.lines] == ["better", "worse", "mean"]
-    headers = grids(table)[0].headers
-    assert headers.index("true RMSE [N]") < headers.index("RMSE [N]")
     before = against_reference(better)
     assert (before["metric"], before["score"]) == ("rmse", better["reference_score"])
     assert over_replicates(list(found.values())) == list(found.values())
@@ -222,3 +218,31 @@ def test_where_one_answer_or_a_real_rig_knows_no_true_force_all_are_ranked_by_th
     real = forces([None] * 6, NOISY, "a", simulated=False)
     for rows in (one_unknown, real):
         assert {(one["metric"], one.get("reference_score")) for one in over_replicates(rows)} <= {("rmse", None)}
+
+
+def filled(metric="rmse", scores=None, **more):
+    given = scores or {"lasso": 0.7, "mean": 1.6, "median": 1.5, "time-index": 0.6}
+    looks = {"lasso": "features", "time-index": "time", "clock": "time"}
+    rows = [
+        row(estimator=name, score=score, cell=f"c-{name}", metric=metric, is_baseline=name not in ("lasso", "clock"),
+            looks_at=looks.get(name, "nothing"), **more)
+        for name, score in given.items()
+    ]  # fmt: skip
+    return {one["estimator"]: one for one in over_replicates(rows)}
+
+
+def test_the_best_of_those_that_look_at_nothing_whatever_comes_first():
+    assert filled()["lasso"]["baseline"] == 1.5
+    shares = filled("macro_f1", {"lasso": 0.5, "majority": 0.07, "chance": 0.2})
+    assert shares["lasso"]["baseline"] == 0.2
+
+
+def test_an_answer_that_looks_at_the_time_is_held_against_those_that_do_too():
+    rows = filled(scores={"lasso": 0.7, "clock": 0.7, "mean": 1.6, "time-index": 0.6})
+    assert rows["clock"]["baseline"] == 0.6
+    assert rows["lasso"]["baseline"] == 1.6
+
+
+def test_without_a_finished_trivial_answer_there_is_no_baseline():
+    assert filled(scores={"lasso": 0.7})["lasso"]["baseline"] is None
+    assert filled(scores={"lasso": 0.7, "time-index": 0.6})["lasso"]["baseline"] is None
