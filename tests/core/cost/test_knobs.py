@@ -1,6 +1,5 @@
 """What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
 
-import json
 import math
 from collections import Counter
 
@@ -19,13 +18,11 @@ from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
-from tactbench.core.report.costs import trade_table, write_trade
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.figures.trade import draw_precision, draw_trade
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint
 from tests.core.evaluation.made import record
-from tests.core.report.unrendered import unrendered
 from tests.here import IN_THIS_PROCESS
 
 
@@ -98,17 +95,6 @@ def test_what_was_finished_is_found_again(shelf, tmp_path):
     assert times == {one["value"]: one["fit_s"] for one in few["settings"]}, "nothing is timed twice"
 
 
-def test_files_and_tables_say_what_is_known(known, tmp_path):
-    with unrendered():
-        write_trade(known, tmp_path / "cost" / "made-force")
-    paths = {path.suffix: path for path in (tmp_path / "cost").iterdir()}
-    assert paths.keys() == {".json", ".png", ".pdf"}
-    assert json.loads(paths[".json"].read_text()) == json.loads(json.dumps(known))
-    table = trade_table(known)
-    fronts = [line[table.columns.index("front")] == "yes" for line in table.lines]
-    assert fronts == [one["front"] for one in known["settings"]]
-
-
 def test_the_figure_has_a_path_for_each_knob_and_one_mark_for_each_family(known):
     with styled():
         drawn = draw_trade(known)
@@ -171,15 +157,14 @@ POSITIVE = st.floats(1e-6, 1e3)
 
 
 @given(st.lists(st.tuples(POSITIVE, POSITIVE), min_size=1, max_size=20))
-def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
+def test_no_point_beats_the_front_and_the_front_beats_all_others(pairs):
     points = [cost_point(*pair) for pair in pairs]
     best = precise(points)
     for point in points:
-        beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
-        assert beaten
+        assert any(one.seconds <= point.seconds and one.error <= point.error for one in best)
     for one in best:
-        assert not any(o.seconds < one.seconds and o.error <= one.error for o in points)
-    assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
+        assert not any(other.seconds < one.seconds and other.error <= one.error for other in points)
+    assert [one.error for one in best] == sorted((one.error for one in best), reverse=True)
 
 
 def test_the_quickest_point_that_will_do():
