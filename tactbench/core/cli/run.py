@@ -1,4 +1,4 @@
-"""``tactbench run``: acquire, evaluate, rank."""
+"""``tactbench run``: acquisition, evaluation and ranking."""
 
 from __future__ import annotations
 
@@ -86,13 +86,11 @@ def command(
 
 
 def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Print a line for every stopped cell with its reason, and the commands that show its details."""
+    """Print a line for every stopped cell with its reason, and the command that shows the details of one."""
     if not rows:
         return
     remark(f"\nStopped: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
-    which = str(rows[0]["cell"]), "--out", str(folder)
-    remark(f"Details of one:  {command_line('tactbench', 'why', *which)}")
-    remark(f"Compute again:   {command_line('tactbench', 'why', *which, '--again')}")
+    remark(f"Details of one: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")

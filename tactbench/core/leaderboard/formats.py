@@ -90,8 +90,7 @@ def _column(name: str, texts: Sequence[str]) -> str:
 
 def _caption(block: Block) -> str:
     """Return the title of a block, its setting, its origin, and the number of test samples."""
-    rows = [line.row for line in block.lines if line.kind == "result"]
-    counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
+    counts = sorted({line.row["n_test"] for line in block.lines if line.row["n_test"] is not None})
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
@@ -188,8 +187,8 @@ def parquet(table: Table) -> bytes:
     metadata = {"tactbench.provenance": json_text(list(table.provenance), sort_keys=True)}
     schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
-    columns = zip(*lines, strict=True) if lines else [()] * len(names)
-    pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
+    columns = [list(column) for column in zip(*lines, strict=True)]
+    pq.write_table(pa.table(columns, schema=schema), out, compression="zstd")
     return out.getvalue()
 
 

@@ -13,10 +13,10 @@ from tactbench.core.leaderboard.names import held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import against_reference, count_range, percent
 from tactbench.core.tables.text import command_line, visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite
+from tactbench.core.tables.text_table import TextTable
 
 CELL, REASON = "cell", "reason"
-"""Columns of the names of cells, and of the reasons why they did not finish."""
+"""Columns for the names of cells, and for the reasons why they did not finish."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "training", "published", "delay after touch",
@@ -29,7 +29,7 @@ class View:
     """A selection of columns to print."""
 
     wide: bool = False
-    """Whether all columns are printed."""
+    """True prints all columns."""
     columns: tuple[str, ...] = ()
     """Columns to print instead of the default ones; see `known_columns`."""
     folder: str = ""
@@ -67,7 +67,7 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
-    """Return the printed table of a block; its entries have the number they are sorted by and their cell."""
+    """Return the printed table of a block."""
     short = not view.wide and not view.columns
     # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
@@ -95,12 +95,8 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
 
 def _texts(line: Line) -> dict[str, str]:
     row = line.row
-    found = {
-        name: text if name not in NUMERIC or not text else Entry(text, finite(line.value(name)), cell=row["cell"])
-        for name, text in line.texts.items()
-    }
     why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
-    return {**found, CELL: visible(str(row["cell"])), REASON: why}
+    return {**line.texts, CELL: visible(str(row["cell"])), REASON: why}
 
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:

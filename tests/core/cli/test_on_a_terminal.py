@@ -69,7 +69,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     said = capsys.readouterr()
     assert said.out == ""
     assert "lines\\x1b[2J\n" in said.err, "a reason moves no cursor"
-    assert f"a/b/c --out {tmp_path} --again" in said.err
+    assert f"a/b/c --out {tmp_path}" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
 
 

@@ -13,11 +13,11 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.figures import classification
 from tactbench.core.report.figures.classification import confusion
-from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.group import groups
 from tactbench.core.report.figures.published_and_ours import draw_published
 from tactbench.core.report.figures.regression import prediction_against_time
 from tactbench.core.report.figures.style import styled
+from tactbench.core.report.page import draw_figures
 from tactbench.core.report.published import reproduce
 from tactbench.core.report.results import Results, open_results
 from tactbench.core.spec.matrix import MatrixSpec
