@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import Setting, measure, settings_of
+from tactbench.core.cost.knobs import Setting, measure, quick_estimator, settings_of
 from tactbench.core.cost.precision import precise, quickest_enough
-from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import stated_delay_ms
 from tactbench.core.evaluation.folds import load_task
@@ -127,16 +127,14 @@ def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, 
     assert not any("sampled at" in one for one in remarks)
 
 
-@pytest.mark.parametrize("name", ["@", "@k", "@k=-1", "@every=0", "@,k=1", "@k=1,every=2", "@tare=1", "@k=1@k=2"])
-def test_what_is_no_option_of_a_protocol_is_refused(name):
-    with pytest.raises(UsageError, match="no option"):
-        protocol_called(f"deployable{name}")
-
-
 def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
     task = registry.tasks["slip-sequence"].spec
     with pytest.raises(NotApplicable, match="single samples"):
         load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+
+
+def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
+    assert quick_estimator(registry, "force") == "ols"
 
 
 def test_a_setting_is_of_its_own_row_only():
