@@ -40,7 +40,7 @@ def verdict(*rows):
         # Of 40 guesses of four, 16 or more are right in 2.6 % of the cases, 17 or more in 1.2 %: the line is 2.5 %.
         ([classed(0.95), classed(0.425, "first-frame")], "PART"),
         ([classed(0.95), classed(0.40, "first-frame")], "no leak shown"),
-        ([erring(1.0), erring(9.9, "first-frame", ci_low=9.0, ci_high=10.5)], "no leak shown"),
+        ([erring(1.0), erring(9.9, "first-frame", ci_low=9.0, ci_high=10.5, n_test=5)], "no leak shown"),
         ([erring(1.0), erring(2.0, "first-frame", n_test=4)], "too few recordings for the first frame"),
         ([classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled")], "LEAK, OPTIMISTIC"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
