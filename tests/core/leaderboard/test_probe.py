@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.probe import build_probe
+from tactbench.core.leaderboard.probe import build_probe, with_leaks
 from tests.core.leaderboard.rows import row
 
 
@@ -55,6 +55,8 @@ def verdict(*rows):
 )
 def test_first_frames_and_shuffled_rows(rows, says):
     assert verdict(*rows) == says
+    stamps = with_leaks(rows)[0]["stamps"]
+    assert (len(stamps) > len(rows[0]["stamps"])) == (says.startswith("LEAK") and not rows[0]["stamps"])
 
 
 def test_nothing_is_shown_where_nothing_was_probed():
