@@ -183,7 +183,7 @@ ABOVE = {
         lambda t, a, n, b: t.better == [t.called(a)] and int(n or 1) == len(t.answers) and t.bars(b, t.better),
     r"(.*(?:campaign|session|recording|press)(?:e?s)?): too few .* need 5(?: \(`--repeats 8`\))?; (\S+) has .*\.":
         lambda t, n, a: t.counts(n, t.better) and min(o["n_replicates"] for o in t.better) < 5 and t.leads(a),
-    r"(?:The only|None of (\d+)) answers? scores (?:no )?better than the trivial one of its own sensor \((.*)\)\.":
+    r"(?:The only answer|None of ([2-9]|\d\d) answers) scores (?:no )?better than .* of its own sensor \((.*)\)\.":
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
     r"time reads no sensor, only the time: such a score needs no touch\.":
         lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
