@@ -1,11 +1,8 @@
 """What a reader does with the page: opens it from disk without a network, sorts, filters, unfolds, reads on a phone."""
 
-import io
 import json
 
-import numpy as np
 import pytest
-from PIL import Image
 
 pytestmark = pytest.mark.browser
 
@@ -86,18 +83,3 @@ def test_the_page_never_scrolls_sideways_and_sentences_in_tables_are_read_withou
     assert max(boxes) <= 0
     buttons = opened.find_elements("css selector", "#leaderboards th button")
     assert all(one.is_displayed() for one in buttons)
-
-
-def test_where_columns_go_on_at_a_side_there_is_a_shadow(opened):
-    resize(opened, 390)
-    opened.execute_script("document.querySelectorAll('details').forEach(one => { one.open = true; })")
-    wide = "return [...document.querySelectorAll('.box')].find(one => one.scrollWidth > one.clientWidth + 20)"
-    box = opened.execute_script(wide)
-    shades = []
-    for place in (0, 9999):
-        opened.execute_script("arguments[0].scrollTo(arguments[1], 0)", box, place)
-        pixels = np.asarray(Image.open(io.BytesIO(box.screenshot_as_png)).convert("L"), dtype=float)
-        shades.append([np.median(pixels[:, column]) for column in (3, -4)])
-    (left, right), (left_at_end, right_at_end) = shades
-    assert left > left_at_end + 20
-    assert right < right_at_end - 20

@@ -40,7 +40,7 @@ def command(
     NAME is one of these, a mapping file, or a plugin, all of whose contents are checked. Without --rig-file no device
     is opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
-    from tactbench.core.cli.grid import print_fields
+    from tactbench.core.cli.grid import print_fields, print_records
     from tactbench.core.conformance.check import CHECKS, KINDS, Mode
     from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
@@ -51,12 +51,9 @@ def command(
     from tactbench.core.tables.text import json_text
 
     if listed:
-        of = [(one, "all" if one.kinds == KINDS else ", ".join(one.kinds)) for one in CHECKS]
-        if shape == "json":
-            click.echo(json_text([{"check": one.name, "of": kinds, "mode": one.mode, "why": one.why, "do": one.cure}
-                                  for one, kinds in of], indent=1))  # fmt: skip
-        else:
-            print_fields([(one.name, f"{kinds}: {one.why}") for one, kinds in of])
+        checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds), "mode": one.mode,
+                   "why": one.why, "do": one.cure} for one in CHECKS]  # fmt: skip
+        print_records(checks, shape, title="checks", columns=("check", "of", "why"))
         return
     if name is None:
         raise UsageError("No NAME was given.", hint="`tactbench list plugins` shows the names.")

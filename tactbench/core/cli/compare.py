@@ -22,7 +22,6 @@ def command(first: str, second: str, out: Path, task: str | None, config: str | 
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """
     from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.pairwise import (
         comparisons,
         folder_comparisons,
@@ -40,11 +39,6 @@ def command(first: str, second: str, out: Path, task: str | None, config: str | 
         matrix = matrix_called(config)
         rows = shown_rows(opened(out))
         found = with_declared(comparisons(rows, first, second, task), rows, matrix.comparisons)
-    if not found:
-        raise UsageError(
-            f"{first} and {second} have no cell to compare" + (f" in task {task!r}." if task else "."),
-            hint="See what there is with `tactbench leaderboard`.",
-        )
     if shape in ("json", "csv"):
         print_records(list(map(record_of, found)), shape)
     else:

@@ -67,7 +67,7 @@ def _show_knobs(
     from tactbench.core.matrix.run import EngineChoice
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.costs import trade_table, write_trade
+    from tactbench.core.report.figures.trade import trade_table, write_trade
     from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
     from tactbench.core.study.progress import progress
     from tactbench.core.study.shipped import matrix_called

@@ -1,7 +1,9 @@
-"""How verbs print tables and records: for people as a table, Markdown or LaTeX, for programs as JSON or CSV."""
+"""Output of verbs: tables and records for people as text, Markdown or LaTeX, for programs as JSON or CSV."""
 
 from __future__ import annotations
 
+import shutil
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -32,9 +34,10 @@ def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
 
 def print_fields(fields: Sequence[tuple[str, str]]) -> None:
     """Print names and values on stdout, a field a line; long values are broken at spaces of the terminal's width."""
-    from tactbench.core.tables.terminal import console
+    from tactbench.core.tables.terminal import WITHOUT_EDGE
 
-    left, width = max((len(name) for name, _ in fields), default=0) + 2, console().width
+    left = max((len(name) for name, _ in fields), default=0) + 2
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WITHOUT_EDGE
     for name, value in fields:
         lines = textwrap.wrap(
             f"{visible(name):<{left}}{visible(value)}", width, subsequent_indent=" " * left,
@@ -55,11 +58,11 @@ def print_records(
         Of a table: its title; the keys that it shows (default: all), but for those without any entry; and one word a
         record, by which it looks, see `tactbench.core.tables.terminal`.
     """
-    from tactbench.core.tables.csv_text import csv_of_records
+    from tactbench.core.tables.csv_text import csv_text
 
     if shape == "json":
         click.echo(json_text(list(records), indent=1))
     elif shape == "csv":
-        click.echo(csv_of_records(records), nl=False)
+        click.echo(csv_text(records[0] if records else (), (one.values() for one in records)), nl=False)
     elif records:
         print_tables([records_table(title, records, columns or tuple(records[0]), kinds=kinds)])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tactbench.core.recording.mapping import ImportReport
 
 MOST_NAMED = 12
-"""Most findings that are printed, the worst first."""
+"""Largest number of findings that are printed, the worst first."""
 PAIRS = "KEY=VALUE"
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
 _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
-"""Fields of the meta that have a form of their own on the screen or none; JSON has them."""
+"""Fields of the meta that the screen shows in another form, or not at all; JSON has them."""
 
 
 @click.command(name="inspect")

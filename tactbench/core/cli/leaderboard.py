@@ -52,15 +52,10 @@ def command(
                          hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
     if columns is not None and shape not in FOR_PEOPLE:
         raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
-    view = View(wide, known_columns(columns.split(",") if columns is not None else ()), named_folder(folder))
+    view = View(wide, known_columns(columns.split(",") if columns is not None else ()))
     store = opened(folder)
     table = table_of(store, _only(shown_rows(store), filters))
     print_table(best_of(table, best) if best else table, shape, view, to=to)
-
-
-def named_folder(folder: Path) -> str:
-    """Return a result folder as a command has to name it: empty for the default one."""
-    return "" if folder == DEFAULT_FOLDER else str(folder)
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:

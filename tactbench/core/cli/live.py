@@ -122,7 +122,7 @@ class LiveView:
             self._live.start()
 
     def watch(self, block: Block) -> None:
-        """Take the newest samples of a block, to which no reference is kept."""
+        """Take the newest samples of a block; no reference to it is kept."""
         if block.stream in self._states:
             self._states[block.stream].take(block)
 

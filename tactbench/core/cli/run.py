@@ -1,4 +1,4 @@
-"""``tactbench run``: acquire, evaluate, rank."""
+"""``tactbench run``: acquisition, evaluation and ranking."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.leaderboard import TABLE_FORMATS, named_folder, print_table
+from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table
 from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
@@ -64,7 +64,7 @@ def command(
     from tactbench.core.cli.listing import remark_failed
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.table import over_all
-    from tactbench.core.leaderboard.view import View
+    from tactbench.core.leaderboard.view import DEFAULT_VIEW
     from tactbench.core.plugins.registry import installed
     from tactbench.core.study.results import table_of
     from tactbench.core.study.study import Study, carry_out
@@ -72,7 +72,7 @@ def command(
     remark_failed(installed())
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **options_given))
     table = table_of(store, over_all(store, outcome.rows))
-    print_table(table, shape, View(folder=named_folder(store.folder)))
+    print_table(table, shape, DEFAULT_VIEW)
     write_tables(table, store.folder)
     count = len(outcome.rows)
     remark(f"\n{count - outcome.computed} of {count} answers were found finished, {outcome.computed} computed now; "
@@ -81,18 +81,17 @@ def command(
         remark(f"{len(store.superseded)} of them supersede answers of the same names from other recordings: tables "
                "show the latest. Another --out DIR keeps both.")  # fmt: skip
     remark(f"Files: {store.folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
+    remark(f"Next: {command_line('tactbench', 'report', str(store.folder))}")
     remark_stopped(outcome.failures, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 
 
 def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Print a line for every stopped cell with its reason, and the commands that show its details."""
+    """Print a line for every stopped cell with its reason, and the command that shows the details of one."""
     if not rows:
         return
     remark(f"\nStopped: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
-    which = str(rows[0]["cell"]), "--out", str(folder)
-    remark(f"Details of one:  {command_line('tactbench', 'why', *which)}")
-    remark(f"Compute again:   {command_line('tactbench', 'why', *which, '--again')}")
+    remark(f"Details of one: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")

@@ -102,12 +102,9 @@ def _again(found: StoredCell) -> dict[str, Any]:
 
 
 def _print_again(facts: dict[str, Any], _: StoredCell) -> None:
-    from tactbench.core.cli.grid import print_fields
+    from tactbench.core.cli.grid import field_text, print_fields
 
-    fields = [("cell", facts["cell"]), ("answers, scores, intervals", facts["answer"]), ("status", facts["status"])]
-    fields += [("reason", facts["reason"]), ("recordings made", str(facts["recordings_made"]))]
-    fields += [("differs", text) for text in facts["differences"]]
-    fields += [("changed since", text) for text in facts["circumstances"]]
-    print_fields([(name, value) for name, value in fields if value])
+    texts = {**facts, "traceback": ""}
+    print_fields([(name.replace("_", " "), text) for name, one in texts.items() if (text := field_text(one))])
     if facts["traceback"]:
         click.echo(visible_lines(facts["traceback"]))

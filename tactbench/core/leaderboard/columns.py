@@ -12,6 +12,7 @@ from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, whole
 from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import Entry, finite
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
 """Kind of a line: an answer, a trivial answer, a cell that failed, or one that was skipped."""
@@ -96,18 +97,10 @@ class Line:
     row: Row = field(repr=False, compare=False)
     """Row with all digits."""
     texts: Mapping[str, str]
-    """Texts by column."""
+    """Texts by column; numbers are entries."""
     kind: Kind
     placing: Rank | None = None
     """Rank in its block; None for answers that are no better than the trivial one of their sensor."""
-
-    def value(self, column: str) -> float | None:
-        """Return the number that a line is sorted by in a column; None sorts last."""
-        if column == "place":
-            return self.placing.place if self.placing else None
-        sorted_by = OF_ROWS[column].value if column in OF_ROWS else None
-        # The row of a stopped cell may have a number that the table does not show.
-        return sorted_by(self.row) if sorted_by and self.kind in ("result", "baseline") else None
 
 
 def line_of(row: Row, placing: Rank | None = None, marks: Sequence[str] = (), place: str = "") -> Line:
@@ -116,10 +109,12 @@ def line_of(row: Row, placing: Rank | None = None, marks: Sequence[str] = (), pl
     if row["status"] != "done":
         texts |= {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
         return Line(row, texts, "failed" if row["status"] in STOPPED else "skipped")
-    # An absent value is empty: the dash means that an answer has no place.
-    texts |= {name: text for name, column in OF_ROWS.items() if (text := column.text(row)) != ABSENT}
+    for name, column in OF_ROWS.items():
+        text = column.text(row)
+        if text != ABSENT:  # an absent value is empty: the dash means that an answer has no place
+            value = column.value
+            texts[name] = text if value is None else Entry(text, finite(value(row)), cell=row["cell"])
     if placing:
-        place = f"{placing.place}=" if placing.unsure else str(placing.place)
-    return Line(
-        row, texts | {"place": place, "notes": " ".join(marks)}, "baseline" if row["is_baseline"] else "result", placing
-    )
+        place = Entry(f"{placing.place}=" if placing.unsure else str(placing.place), placing.place, cell=row["cell"])
+    texts |= {"place": place, "notes": " ".join(marks)}
+    return Line(row, texts, "baseline" if row["is_baseline"] else "result", placing)

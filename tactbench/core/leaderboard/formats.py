@@ -15,12 +15,12 @@ from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
 from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
+from tactbench.core.leaderboard.view import WHOLE, View, document, grids
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
-from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
 from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex_table
+from tactbench.core.tables.markdown import markdown
 from tactbench.core.tables.numbers import whole
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import TextTable
@@ -35,19 +35,7 @@ _LONG = 12
 """Largest number of characters of a name that its column in a paper does not break."""
 
 
-def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
-    """Return a leaderboard as a terminal without colours shows it."""
-    return terminal.plain_text(document(table, view), width)
-
-
-def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return a leaderboard as Markdown, a heading a block, with its provenance."""
-    parts: list[TextTable | Sequence[str]] = [*grids(table, view), *table.sections]
-    parts += [table.footer] if table.footer else []
-    return markdown_format.markdown(parts)
-
-
-def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
+def latex(table: Table, view: View) -> str:
     """Return the blocks as LaTeX, each a table for one column of a paper; events and probes go over both columns."""
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
@@ -90,8 +78,7 @@ def _column(name: str, texts: Sequence[str]) -> str:
 
 def _caption(block: Block) -> str:
     """Return the title of a block, its setting, its origin, and the number of test samples."""
-    rows = [line.row for line in block.lines if line.kind == "result"]
-    counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
+    counts = sorted({line.row["n_test"] for line in block.lines if line.row["n_test"] is not None})
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
@@ -115,12 +102,15 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     """
     if shape in ("parquet", "xlsx"):
         return parquet(table) if shape == "parquet" else xlsx(table)
-    text = {
-        "table": lambda: plain_text(table, width, view), "md": lambda: markdown(table, view),
-        "latex": lambda: latex(table, view), "csv": lambda: csv_text(*flat_records(table)),
-        "json": lambda: json_array(table),
-    }[shape]()  # fmt: skip
-    return text.encode("utf-8", "backslashreplace" if shape == "table" else "replace")
+    if shape == "table":
+        return terminal.plain_text(document(table, view), width).encode("utf-8", "backslashreplace")
+    if shape == "md":
+        text = markdown([*document(table, view), *([table.footer] if table.footer else [])])
+    elif shape == "latex":
+        text = latex(table, view)
+    else:
+        text = csv_text(*flat_records(table)) if shape == "csv" else json_array(table)
+    return text.encode("utf-8", "replace")
 
 
 def write_tables(table: Table, folder: Path) -> None:
@@ -188,8 +178,8 @@ def parquet(table: Table) -> bytes:
     metadata = {"tactbench.provenance": json_text(list(table.provenance), sort_keys=True)}
     schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
-    columns = zip(*lines, strict=True) if lines else [()] * len(names)
-    pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
+    columns = [list(column) for column in zip(*lines, strict=True)]
+    pq.write_table(pa.table(columns, schema=schema), out, compression="zstd")
     return out.getvalue()
 
 

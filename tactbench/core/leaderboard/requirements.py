@@ -20,7 +20,7 @@ from tactbench.core.spec.units import conversion
 from tactbench.core.tables.numbers import duration
 
 MET, MISSED, UNKNOWN = "met", "missed", "unknown"
-"""How each text of a column of requirements begins."""
+"""Beginnings of the texts in a column of requirements."""
 ANSWER, DELAY, RANGE, RATE = "answer", "answer delay", "force range", "rate"
 COLUMNS = ("place", "sensor", "estimator", "score", "notes", "interval", "beyond floor", DELAY, RANGE, RATE, ANSWER)
 _PARTS = ("sampling", "link", "window", "features", "prediction")

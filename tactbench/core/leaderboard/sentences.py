@@ -32,7 +32,7 @@ class Note(NamedTuple):
 
     text: str
     printed: bool = False
-    """Whether a table in a paper needs it, to explain a mark or the scores."""
+    """True if a table in a paper needs it, to explain a mark or the scores."""
 
 
 @dataclass(frozen=True)

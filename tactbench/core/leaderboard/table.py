@@ -1,4 +1,4 @@
-"""Builds from rows the one table object that every format renders.
+"""Builds the table object that every format renders.
 
 Rows that may be compared stand in one block, and ranks are within a block. Rows under different tasks, protocols or
 splits, and rows from the twin and from hardware, are not comparable. A table depends on its rows, not on their order.
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 _Key = tuple[str, str, str, str]
 LONGEST = 1000
-"""Characters of a sentence on the provenance; the whole of it lies in the result folder."""
+"""Largest number of characters of a sentence on the provenance."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Table:
 
     blocks: tuple[Block, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: events, and what was probed."""
+    """Tables below the blocks: events and probes."""
     provenance: tuple[Row, ...] = ()
     """Versions, machine and commit of the runs."""
 
@@ -197,8 +197,8 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
         if row["status"] != "done":
             question = (row["task"], row["protocol"], row["rig"])
             found = [key for key, rig in near.items() if rig == question and row["split"] in (None, key[2])]
-            alone = (*question[:2], row["split"] or "", hardware_name(row))
-            groups.setdefault(found[0] if len(found) == 1 else alone, []).append(row)
+            own = (*question[:2], row["split"] or "", hardware_name(row))
+            groups.setdefault(found[0] if len(found) == 1 else own, []).append(row)
     return groups
 
 

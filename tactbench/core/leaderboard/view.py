@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
 from tactbench.core.leaderboard.names import held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import against_reference, count_range, percent
-from tactbench.core.tables.text import command_line, visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 CELL, REASON = "cell", "reason"
-"""Columns of the names of cells, and of the reasons why they did not finish."""
+"""Columns for the names of cells, and for the reasons why they did not finish."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "training", "published", "delay after touch",
@@ -29,11 +28,9 @@ class View:
     """A selection of columns to print."""
 
     wide: bool = False
-    """Whether all columns are printed."""
+    """True prints all columns."""
     columns: tuple[str, ...] = ()
     """Columns to print instead of the default ones; see `known_columns`."""
-    folder: str = ""
-    """The result folder, for commands that are named; empty: the default one."""
 
 
 DEFAULT_VIEW = View()
@@ -56,9 +53,9 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(known[name] for name in names))
 
 
-def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable | tuple[str, ...]]:
-    """Return the tables and notes that are printed, in their order."""
-    return [*grids(table, view), *table.sections, *([commands(table, view)] if table.blocks else [])]
+def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
+    """Return the tables that are printed, in their order."""
+    return [*grids(table, view), *table.sections]
 
 
 def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
@@ -67,7 +64,7 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
-    """Return the printed table of a block; its entries have the number they are sorted by and their cell."""
+    """Return the printed table of a block."""
     short = not view.wide and not view.columns
     # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
@@ -95,12 +92,8 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
 
 def _texts(line: Line) -> dict[str, str]:
     row = line.row
-    found = {
-        name: text if name not in NUMERIC or not text else Entry(text, finite(line.value(name)), cell=row["cell"])
-        for name, text in line.texts.items()
-    }
     why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
-    return {**found, CELL: visible(str(row["cell"])), REASON: why}
+    return {**line.texts, CELL: visible(str(row["cell"])), REASON: why}
 
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
@@ -117,25 +110,6 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
     shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(rows[0]))}
     return tuple(shown.get(name, name) for name in names)
-
-
-def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
-    """Return commands to run next, and their purposes."""
-    where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
-    first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
-    found = {
-        command_line("tactbench", "why", str(first["cell"]), *out): "what this score rests on",
-        command_line("tactbench", "report", *where): "figures and every detail",
-        command_line("tactbench", "leaderboard", *where, "--format", "latex"): "for a paper",
-    }
-    unprobed = not any(is_probe(row["protocol"]) for row in table.rows)
-    if unprobed and not first["simulated"] and first["split"] != "in-session":
-        found["tactbench run … --probe"] = "label leakage"
-    width = max(map(len, found))
-    return tuple(
-        f"{'' if place else 'Next: ':6}{command:<{width}}  {what}"
-        for place, (command, what) in enumerate(found.items())
-    )
 
 
 def best(table: Table, count: int) -> Table:

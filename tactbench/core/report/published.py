@@ -31,7 +31,7 @@ class Reproduction:
 
     @property
     def title(self) -> str:
-        """Return what was published, with our sensor and estimator where the publication names none."""
+        """Return the published title, with our sensor and estimator where the publication names none."""
         title = self.published.title or f"{self.task.name}, {self.task.metric}"
         ours = [str(self.row[key]) for key in ("sensor", "estimator") if getattr(self.published, key) is None]
         return f"{title} ({', '.join(ours)})" if ours else title

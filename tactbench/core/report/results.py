@@ -32,7 +32,7 @@ class SavedFigure:
     title: str
     """The question that it answers."""
     caption: str
-    """What is on the axes and how to read it, in sentences a paper could use."""
+    """Description of axes and marks, in sentences that a paper could use."""
     png: Path
     """Path of the picture; the PDF lies beside it."""
 
@@ -73,11 +73,11 @@ class Results:
         return {str(line.row["cell"]): f"cell-{place}" for place, line in enumerate(lines, 1)}
 
     def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
-        """Return what a cell answered, by role; empty if it did not finish."""
+        """Return the answers of a cell by role; empty if it did not finish."""
         return self.store.answers(str(row["key"]))
 
     def replicate(self, row: Row) -> Row:
-        """Return the row of the one replicate whose answers and recordings a cell's row leads to, with their number."""
+        """Return the row of the replicate whose answers are stored for a cell, with the number of replicates."""
         return {**self.replicates.get(str(row["key"]), row), "repeats": row["repeats"]}
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
@@ -100,7 +100,7 @@ class Results:
 
 
 def open_results(store: Store, registry: Registry) -> Results:
-    """Return what `store` holds: a row a cell."""
+    """Return the results of `store`: one row for each cell."""
     rows = store.rows()
     shown = tuple(over_all(store, rows))
     return Results(store, with_declared_of(registry, shown), shown, {str(row["key"]): row for row in rows})
@@ -108,7 +108,7 @@ def open_results(store: Store, registry: Registry) -> Results:
 
 @dataclass(frozen=True)
 class Details:
-    """Everything that is known about one cell; the page unfolds it."""
+    """Everything that is known about one cell."""
 
     cell: str
     status: str

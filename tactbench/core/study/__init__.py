@@ -1,1 +1,1 @@
-"""One run, described by options: the verbs and the functions of Python both call this room."""
+"""One run, described by options, for the verbs and for the functions of Python."""

@@ -1,4 +1,4 @@
-"""Prompts for the operator of a rig, on stderr, which are answered with Enter."""
+"""Prompts on stderr for the operator of a rig, who answers with Enter."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def scene_of(registry: Registry, sensor: SensorDescriptor, indenter: str | None,
     elif pressed.shape is not None:
         labels["indenter"] = pressed.shape
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
-    # The name of the scene decides its draws: the seed alone shall, and not the name of the file.
+    # The name of a scene decides its random draws: a constant name leaves that to the seed.
     return Scene(
         name="press", indenter=pressed, profile=ForceRamp() if profile is None else _profile(registry, profile),
         observe=("taxel",) if "taxel" in kinds else kinds, labels=labels,

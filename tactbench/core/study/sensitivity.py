@@ -1,4 +1,4 @@
-"""Runs a task with nuisances at the ends of their ranges, each set of ends into a folder of its own."""
+"""Runs a task with nuisances at the ends of their ranges, each set of ends into its own folder."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from tactbench.core.study.progress import progress
 from tactbench.core.study.study import Study, matrix_of
 from tactbench.core.tables.terminal import remark
 
+Single = tuple[str, str]
+"""A nuisance and an end of its range."""
 STRONGEST = 3
 """Number of nuisances that are also set in pairs: those whose absence improves the scores most."""
-Values = Mapping[str, Mapping[str, float]]
-"""Values of the nuisances by sensor."""
 
 
 def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[Row]:
@@ -43,7 +43,7 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
         def run(ends: Mapping[str, str]) -> None:
             remark(f"{name_of(ends)}:")
             values = {
-                sensor: {name: value for one in ends.items() for name, value in singles[one].get(sensor, {}).items()}
+                sensor: {one[0]: singles[one][sensor] for one in ends.items() if sensor in singles[one]}
                 for sensor in matrix.sensors
             }
             folder = Store(study.out / FOLDER / name_of(ends))
@@ -60,10 +60,12 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
     return stopped
 
 
-def _singles(matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]) -> dict[tuple[str, str], Values]:
-    """Return the values to set, by nuisance and end, for each end that differs from the stated value.
+def _singles(
+    matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]
+) -> dict[tuple[str, str], dict[str, float]]:
+    """Return the values to set by sensor, for each nuisance and end that differs from the stated value.
 
-    A nuisance in which the task's scenes differ is no assumption but what the task asks about, and is left.
+    A nuisance in which the task's scenes differ is the subject of the task, and is left out.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def _singles(matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]) -
     for nuisance in nuisances:
         if nuisance not in known:
             raise UnknownNameError("nuisance with a range", nuisance, known)
-    found: dict[tuple[str, str], dict[str, dict[str, float]]] = {}
+    found: dict[Single, dict[str, float]] = {}
     for nuisance in nuisances or known:
         for sensor, spec in specs.items():
             own = {name: amount.value for name, amount in spec.settable().items()} | dict(matrix.simulation.nuisances)
@@ -85,12 +87,12 @@ def _singles(matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]) -
             for end in ("lower", "upper") if nuisance in ranges[sensor] and len(stated) == 1 else ():
                 value = getattr(ranges[sensor][nuisance], end)
                 if value not in stated:
-                    found.setdefault((nuisance, end), {})[sensor] = {nuisance: value}
-    return dict(found)
+                    found.setdefault((nuisance, end), {})[sensor] = value
+    return found
 
 
-def _strongest(store: Store, tasks: set[str], singles: set[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return the nuisances without which the sensors score best, each with its better end, as far as computed."""
+def _strongest(store: Store, tasks: set[str], singles: set[Single]) -> list[Single]:
+    """Return the nuisances at whose ends the scores improve most, each with that end, as far as computed."""
     best: dict[str, tuple[float, str]] = {}
     for one in sensitivities(store).values():
         for name in one.rows:

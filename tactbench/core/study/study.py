@@ -1,4 +1,4 @@
-"""One run: its options, the matrix that they describe, and how it is carried out."""
+"""One run: its options, the matrix that they describe, and its execution."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tactbench.core.study.simulation import simulation_of
 
 
 def _each(given: Any) -> Any:
-    """Return a list of words: of one word or path, of several, or an empty one for None."""
+    """Return one word or path, or several, as a list of words; an empty list for None."""
     several = () if given is None else (given,) if isinstance(given, str | os.PathLike) else given
     if not isinstance(several, Iterable):
         return given
@@ -50,7 +50,7 @@ class Study(Frozen):
     protocol: Words = ()
     split: Words = ()
     estimator: Words | None = None
-    """Estimators; trivial ones run beside them, and alone if this is empty."""
+    """Estimators; trivial ones run beside them, and by themselves if this is empty."""
     config: Path | None = None
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
     seed: int | None = Field(default=None, ge=0)

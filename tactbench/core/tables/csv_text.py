@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from tactbench.core.tables.text import json_text
@@ -19,8 +19,3 @@ def csv_text(names: Iterable[str], lines: Iterable[Iterable[Any]]) -> str:
         [json_text(value) if isinstance(value, list | tuple | dict) else value for value in line] for line in lines
     )
     return out.getvalue()
-
-
-def csv_of_records(records: Sequence[Mapping[str, Any]]) -> str:
-    """Return records, all with the keys of the first, as CSV with a header."""
-    return csv_text(records[0] if records else (), (one.values() for one in records))

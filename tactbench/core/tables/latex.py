@@ -1,4 +1,4 @@
-"""Tables as LaTeX for the booktabs package: they compile with pdfLaTeX as they are, whatever names are made of."""
+"""Tables as LaTeX for the booktabs package and pdfLaTeX; names are escaped."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: i
 
 
 def _label(title: str, number: int) -> str:
-    """Return a label of what the title begins with, and of the table's number: ``tab:tactbench-force-1``."""
+    """Return a label from the beginning of the title and the number of the table: ``tab:tactbench-force-1``."""
     first = re.sub(r"[^A-Za-z0-9]+", "-", re.split(" · |[:.,]", title)[0]).strip("-").lower()
     return f"tab:tactbench-{first or 'table'}-{number}"
 
 
 def tex(text: str) -> str:
-    """Return text that LaTeX sets as it is; a character it has no letter for is written by its number, ``U+4E2D``."""
+    """Return text escaped for LaTeX; a character that pdfLaTeX lacks becomes its number, ``U+4E2D``."""
     return "".join(map(_character, text))
 
 

@@ -1,4 +1,4 @@
-"""Tables as Markdown; names stay text, whatever they are made of."""
+"""Tables as Markdown; markup in names is escaped."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from tactbench.core.tables.text_table import TextTable
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
-"""Characters that are markup wherever they stand; an underscore is so at the edge of a word only."""
+"""Characters that are markup anywhere, and underscores at the edge of a word."""
 
 
 def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:
@@ -34,12 +34,12 @@ def _notes(notes: Sequence[str]) -> list[str]:
 
 
 def markdown_text(text: str) -> str:
-    """Return text that Markdown shows as it is, in a table or a heading; its lines are one of the table."""
+    """Return text escaped for a table or a heading; line breaks become ``<br>``."""
     return "<br>".join(_escaped(line).replace("`", "\\`") for line in text.split("\n"))
 
 
 def markdown_note(text: str) -> str:
-    """Return a sentence that Markdown shows as it is, but for words between backticks, which are code."""
+    """Return a sentence escaped for Markdown; words between backticks stay code."""
     return _escaped(text.strip())
 
 

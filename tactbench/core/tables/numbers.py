@@ -1,4 +1,4 @@
-"""Numbers as people read them."""
+"""Scores, intervals and times as text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def score(value: float | None, unit: str) -> str:
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """Return an interval in the digits of its score; one that the data do not bound above is open."""
+    """Return an interval in the digits of its score; an upper end of None is open."""
     return ABSENT if low is None else f"{score(low, unit)} … {'open' if high is None else score(high, unit)}"
 
 
@@ -25,7 +25,7 @@ def signed(value: float, unit: str) -> str:
 
 
 def suffix(unit: str) -> str:
-    """Return what follows a number: its unit, and nothing where it has none."""
+    """Return the text after a number: its unit, if it has one."""
     return "" if unit == "1" else f" {unit}"
 
 

@@ -18,7 +18,7 @@ _GAP, _MARGIN = 2, 1
 _LEAST = 4
 """Smallest width of a column of words."""
 WITHOUT_EDGE = 400
-"""Width of a table in a file or a pipe, which have no edge: enough for every column of names of ordinary length."""
+"""Width of a table in a file or a pipe: enough for all columns with names of ordinary length."""
 Part = TextTable | Sequence[str]
 """A table, or notes."""
 
@@ -28,25 +28,18 @@ def remark(text: str) -> None:
     print(visible_lines(text), file=sys.stderr)
 
 
-def console() -> Console:
-    """Return a console for stdout; without a terminal it is wide, plain and never cuts a table."""
+def show(parts: Iterable[Part]) -> None:
+    """Print tables and notes on stdout; text from plugins is never read as markup."""
     from rich.console import Console
 
     if sys.stdout.isatty():
-        return Console(highlight=False)
-    return Console(highlight=False, width=WITHOUT_EDGE, color_system=None)
-
-
-def show(parts: Iterable[Part]) -> None:
-    """Print tables and notes on stdout; text from plugins is never read as markup."""
-    if sys.stdout.isatty():
-        _print(parts, console())
+        _print(parts, Console(highlight=False))
     else:
         sys.stdout.write(plain_text(parts, WITHOUT_EDGE))
 
 
 def plain_text(parts: Iterable[Part], width: int = 240) -> str:
-    """Return what a terminal without colours shows; the width is enough for names of ordinary length."""
+    """Return the text that a terminal without colours shows."""
     from rich.console import Console
 
     out = io.StringIO()
@@ -78,7 +71,7 @@ def _print_notes(notes: Sequence[str], console: Console) -> None:
 
 
 def _print_table(table: TextTable, console: Console) -> list[str]:
-    """Print a table without its notes and return the columns that there was no room for."""
+    """Print a table without its notes; return the columns that did not fit."""
     from rich.cells import cell_len
     from rich.padding import Padding
     from rich.table import Table

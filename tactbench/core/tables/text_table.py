@@ -18,7 +18,7 @@ class Entry(str):
 
     __slots__ = ("cell", "value")
     value: float | None
-    """What a column of numbers is sorted by, in one unit for the whole column; None sorts last."""
+    """Number that a column is sorted by, in one unit for the whole column; None sorts last."""
     cell: str
     """The cell that it is from, by name; a page that has a place for each cell makes a link of it."""
 

@@ -97,20 +97,16 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert after_it["score"] == pytest.approx(1e3 * row["score"])
 
 
-def test_one_name_means_one_task(pad):
-    imports = ("import", "pad.yaml", "--out")
-    pad(*imports, "rec/a")
-    declared = pad.folder / "rec" / "a" / "tasks.yaml"
+def test_an_import_replaces_no_other_declaration_unasked(pad):
+    imports = ("import", "pad.yaml", "--out", "rec")
+    pad(*imports)
+    declared = pad.folder / "rec" / "tasks.yaml"
     before = declared.read_bytes()
-    pad(*imports, "rec/a")
-    assert declared.read_bytes() == before
+    pad(*imports)
     (pad.folder / "pad.yaml").write_text(PAD.replace("[session, recording]", "[recording]"))
-    pad(*imports, "rec/a", code=2)
+    pad(*imports, code=2)
     assert declared.read_bytes() == before
-    pad(*imports, "rec/b")
-    refused = pad("run", "--recordings", "rec", "--task", "where", code=2).stderr
-    assert all(word in refused for word in ("'where'", "rec/a/tasks.yaml", "rec/b/tasks.yaml"))
-    pad(*imports, "rec/a", "--replace")
+    pad(*imports, "--replace")
     assert yaml.safe_load(declared.read_text())["tasks"][0]["splits"] == ["recording"]
 
 

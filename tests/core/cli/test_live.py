@@ -94,12 +94,8 @@ def test_a_prompt_has_the_terminal(tmp_path):
 
 
 def test_a_rate_counts_rows_that_come_together_once():
-    def rate_hz(many, period_ns):
+    for many, period_ns, expected in ((1, 10_000_000, 100), (30, 10_000_000, 100), (1, 0, None), (30, 0, 100)):
         state = StreamState(PAD)
         for began_ns in np.arange(many) * 100_000_000:
             state.take(Block("s", began_ns + np.arange(10) * period_ns, np.zeros((10, 5))))
-        return state.rate_hz
-
-    assert rate_hz(1, 10_000_000) == rate_hz(30, 10_000_000) == pytest.approx(100)
-    assert rate_hz(1, 0) is None
-    assert rate_hz(2, 0) == rate_hz(30, 0) == pytest.approx(100)
+        assert state.rate_hz == (expected and pytest.approx(expected))

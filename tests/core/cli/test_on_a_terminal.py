@@ -19,24 +19,18 @@ CURVATURE = (*RUN, "--task", "curvature", "--estimator", "logistic", "--repeats"
 FORCE = (*RUN, "--task", "force", "--estimator", "ols", "--repeats", "2")
 
 
-def interrupted(folder):
-    """Press Ctrl-C while the fifth recording is made; return the exit code and the screen."""
-    folder.mkdir()
-    with on_terminal(CURVATURE, cwd=folder, columns=140, lines=40) as terminal:
-        assert " 4/15" in terminal.read_until(" 4/15")
-        os.write(terminal.ours, b"\x03")
-        terminal.read_until(None)
-        code = terminal.process.wait(60)
-    return code, terminal.seen
-
-
 def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path):
     for attempt in range(3):  # Python drops an interrupt that comes while it is inside a destructor: rare
-        code, seen = interrupted(tmp_path / str(attempt))
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        with on_terminal(CURVATURE, cwd=folder, columns=140, lines=40) as terminal:
+            assert " 4/15" in terminal.read_until(" 4/15")
+            os.write(terminal.ours, b"\x03")
+            terminal.read_until(None)
+            code, seen = terminal.process.wait(60), terminal.seen
         if code == 130 and "Traceback" not in seen:
             break
     assert (code, "Interrupted" in seen, "Traceback" in seen, "KeyboardInterrupt" in seen) == (130, True, False, False)
-    folder = tmp_path / str(attempt)
     finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
     assert finished
     # As a process leaves it that is killed between the last two steps of a recording.
@@ -75,7 +69,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     said = capsys.readouterr()
     assert said.out == ""
     assert "lines\\x1b[2J\n" in said.err, "a reason moves no cursor"
-    assert f"a/b/c --out {tmp_path} --again" in said.err
+    assert f"a/b/c --out {tmp_path}" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
 
 

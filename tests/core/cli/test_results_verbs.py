@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tactbench.core.matrix.store import Store
-from tactbench.core.study.shipped import shipped_rows
 from tests.conftest import Verbs
 from tests.core.matrix import made
 
@@ -85,11 +84,3 @@ def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs)
     # A task of which the folder has nothing is answered from what came along, unless the folder was asked for.
     assert "came with" in verbs("choose", "--task", "curvature").stderr
     assert "curvature" in verbs("choose", "tactbench-results", "--task", "curvature", code=2).stderr
-
-
-def test_the_shipped_results_are_of_both_sensors_simulated():
-    rows, _ = shipped_rows()
-    asked = {(row["sensor"], row["task"], row["protocol"]) for row in rows if row["status"] == "done"}
-    assert asked == {(sensor, task, protocol) for sensor in ("biotac", "icub") for task in ("force", "curvature")
-                     for protocol in ("deployable", "karl2016")}  # fmt: skip
-    assert all(row["simulated"] for row in rows)

@@ -1,9 +1,7 @@
 """What ``run`` is asked for: nuisances, protocols and splits, matrices by name, probes, and tasks of other kinds."""
 
 import json
-import re
 
-import numpy as np
 import pytest
 
 from tactbench.core.matrix.plan import plan_cells
@@ -13,7 +11,6 @@ from tactbench.core.study.shipped import matrix_called, packaged_matrices
 from tactbench.plugin import load_registry
 from tests.conftest import Verbs
 from tests.core.cli.terminals import computed
-from tests.core.evaluation.made import record
 from tests.core.evaluation.made_slip import campaign
 from tests.core.report.unrendered import unrendered
 
@@ -68,20 +65,6 @@ def test_a_split_by_units_records_every_unit_and_is_the_same_on_the_recordings(v
     replay = ("run", "--recordings", "tactbench-results/recordings", "--task", "force", "--estimator", "ols")
     again = verbs(*replay, *BY_UNIT, "--format", "json", "--out", "again")
     assert row_of(again, "ols")["score"] == row["score"]
-
-
-def test_probes_say_whether_the_first_frame_tells(verbs):
-    """Two objects are told apart by an offset, from the first row on."""
-    rng = np.random.default_rng(0)
-    (verbs.folder / "grasps").mkdir()
-    for number in range(24):
-        X = rng.normal(0.0, 0.1, (12, 2))
-        X[:, number % 2] += 3.0
-        path = verbs.folder / "grasps" / f"g{number:02d}.h5"
-        record(path, X, labels={"object": f"o{number % 2}"}, trial=str(number // 2))
-    run = ("run", "--recordings", "grasps", "--task", "object-identity", "--estimator", "logistic", "--probe")
-    for text in (verbs(*run).stdout, verbs("leaderboard").stdout):
-        assert re.search(r"\bLEAK$", text, re.MULTILINE)
 
 
 def test_events_in_time_go_from_the_row_to_tables_why_and_cost(verbs):

@@ -24,13 +24,12 @@ def test_a_screen_is_as_it_is_kept(verbs, name):
     assert [line.rstrip() for line in shown.splitlines()] == (SCREENS / f"{name}.txt").read_text().splitlines()
 
 
-def assert_one_clear_screen(done, *says):
+def assert_one_clear_screen(done, says=""):
     assert done.stdout == ""
     assert done.stderr.startswith("Error: ") or "Usage:" in done.stderr
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) <= 6
-    for text in says:
-        assert text in done.stderr
+    assert says in done.stderr
 
 
 @pytest.mark.parametrize(

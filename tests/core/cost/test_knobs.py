@@ -1,6 +1,5 @@
 """What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
 
-import json
 import math
 from collections import Counter
 
@@ -9,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import Setting, measure, settings_of
+from tactbench.core.cost.knobs import Setting, measure, quick_estimator, settings_of
 from tactbench.core.cost.precision import precise, quickest_enough
-from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import stated_delay_ms
 from tactbench.core.evaluation.folds import load_task
@@ -19,13 +18,11 @@ from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
-from tactbench.core.report.costs import trade_table, write_trade
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.figures.trade import draw_precision, draw_trade
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint
 from tests.core.evaluation.made import record
-from tests.core.report.unrendered import unrendered
 from tests.here import IN_THIS_PROCESS
 
 
@@ -98,17 +95,6 @@ def test_what_was_finished_is_found_again(shelf, tmp_path):
     assert times == {one["value"]: one["fit_s"] for one in few["settings"]}, "nothing is timed twice"
 
 
-def test_files_and_tables_say_what_is_known(known, tmp_path):
-    with unrendered():
-        write_trade(known, tmp_path / "cost" / "made-force")
-    paths = {path.suffix: path for path in (tmp_path / "cost").iterdir()}
-    assert paths.keys() == {".json", ".png", ".pdf"}
-    assert json.loads(paths[".json"].read_text()) == json.loads(json.dumps(known))
-    table = trade_table(known)
-    fronts = [line[table.columns.index("front")] == "yes" for line in table.lines]
-    assert fronts == [one["front"] for one in known["settings"]]
-
-
 def test_the_figure_has_a_path_for_each_knob_and_one_mark_for_each_family(known):
     with styled():
         drawn = draw_trade(known)
@@ -141,16 +127,14 @@ def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, 
     assert not any("sampled at" in one for one in remarks)
 
 
-@pytest.mark.parametrize("name", ["@", "@k", "@k=-1", "@every=0", "@,k=1", "@k=1,every=2", "@tare=1", "@k=1@k=2"])
-def test_what_is_no_option_of_a_protocol_is_refused(name):
-    with pytest.raises(UsageError, match="no option"):
-        protocol_called(f"deployable{name}")
-
-
 def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
     task = registry.tasks["slip-sequence"].spec
     with pytest.raises(NotApplicable, match="single samples"):
         load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+
+
+def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
+    assert quick_estimator(registry, "force") == "ols"
 
 
 def test_a_setting_is_of_its_own_row_only():
@@ -171,15 +155,14 @@ POSITIVE = st.floats(1e-6, 1e3)
 
 
 @given(st.lists(st.tuples(POSITIVE, POSITIVE), min_size=1, max_size=20))
-def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
+def test_no_point_beats_the_front_and_the_front_beats_all_others(pairs):
     points = [cost_point(*pair) for pair in pairs]
     best = precise(points)
     for point in points:
-        beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
-        assert beaten
+        assert any(one.seconds <= point.seconds and one.error <= point.error for one in best)
     for one in best:
-        assert not any(o.seconds < one.seconds and o.error <= one.error for o in points)
-    assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
+        assert not any(other.seconds < one.seconds and other.error <= one.error for other in points)
+    assert [one.error for one in best] == sorted((one.error for one in best), reverse=True)
 
 
 def test_the_quickest_point_that_will_do():

@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.formats import latex, markdown, rendered
+from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.latex import tex
@@ -60,7 +60,9 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows):
 def test_markdown_shows_the_cells_of_the_table_as_text(rows, view):
     table = build_table(rows)
     cells, place = [], None
-    for token in MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(table, view)):
+    for token in (
+        MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(rendered(table, "md", view).decode())
+    ):
         place = [] if token.type == "tr_open" else place
         if token.type == "tr_close":
             cells.append(place)
@@ -77,7 +79,9 @@ def test_markdown_shows_the_cells_of_the_table_as_text(rows, view):
 
 def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number():
     assert tex("50% a_b&ü–中") == r"50\% a\_\allowbreak{}b\&ü--U+4E2D"
-    labels = re.findall(r"\\label\{(tab:tactbench-[a-z0-9-]+)\}", latex(build_table([row(), row(split="trial")])))
+    labels = re.findall(
+        r"\\label\{(tab:tactbench-[a-z0-9-]+)\}", written("latex", [row(), row(split="trial")]).decode()
+    )
     assert labels == ["tab:tactbench-question-1", "tab:tactbench-question-2"]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.probe import build_probe
+from tactbench.core.leaderboard.probe import build_probe, with_leaks
 from tests.core.leaderboard.rows import row
 
 
@@ -40,7 +40,7 @@ def verdict(*rows):
         # Of 40 guesses of four, 16 or more are right in 2.6 % of the cases, 17 or more in 1.2 %: the line is 2.5 %.
         ([classed(0.95), classed(0.425, "first-frame")], "PART"),
         ([classed(0.95), classed(0.40, "first-frame")], "no leak shown"),
-        ([erring(1.0), erring(9.9, "first-frame", ci_low=9.0, ci_high=10.5)], "no leak shown"),
+        ([erring(1.0), erring(9.9, "first-frame", ci_low=9.0, ci_high=10.5, n_test=5)], "no leak shown"),
         ([erring(1.0), erring(2.0, "first-frame", n_test=4)], "too few recordings for the first frame"),
         ([classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled")], "LEAK, OPTIMISTIC"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
@@ -55,6 +55,8 @@ def verdict(*rows):
 )
 def test_first_frames_and_shuffled_rows(rows, says):
     assert verdict(*rows) == says
+    stamps = with_leaks(rows)[0]["stamps"]
+    assert (len(stamps) > len(rows[0]["stamps"])) == (says.startswith("LEAK") and not rows[0]["stamps"])
 
 
 def test_nothing_is_shown_where_nothing_was_probed():

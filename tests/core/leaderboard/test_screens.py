@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.formats import latex, markdown, plain_text
+from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW
 from tactbench.core.statistics.replicates import over_replicates
 
 from .rows import row
@@ -56,22 +57,23 @@ def table():
     return build_table(over_replicates(rows), questions=QUESTIONS)
 
 
-FILES = {
-    **{f"{width}.txt": lambda table, width=width: plain_text(table, width) for width in (80, 100, 140)},
-    "table.md": markdown,
-    "table.tex": latex,
-}
+FILES = {f"{width}.txt": ("table", width) for width in (80, 100, 140)} | {"table.md": ("md",), "table.tex": ("latex",)}
+
+
+def shown(name):
+    shape, *width = FILES[name]
+    return rendered(table(), shape, DEFAULT_VIEW, *width).decode()
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_screens_and_files_are_as_they_were_looked_at(name):
-    assert FILES[name](table()) == (HERE / name).read_text(encoding="utf-8")
+    assert shown(name) == (HERE / name).read_text(encoding="utf-8")
 
 
 def test_the_latex_compiles_and_no_box_is_overfull(tmp_path):
     if shutil.which("pdflatex") is None:
         pytest.skip("there is no pdflatex")
-    (tmp_path / "paper.tex").write_text(DOCUMENT % latex(table()), encoding="utf-8")
+    (tmp_path / "paper.tex").write_text(DOCUMENT % shown("table.tex"), encoding="utf-8")
     done = subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"],
         cwd=tmp_path, capture_output=True, text=True, errors="replace", timeout=60, check=False,
@@ -81,5 +83,5 @@ def test_the_latex_compiles_and_no_box_is_overfull(tmp_path):
 
 
 if __name__ == "__main__":
-    for path, form in FILES.items():
-        (HERE / path).write_text(form(table()), encoding="utf-8")
+    for path in FILES:
+        (HERE / path).write_text(shown(path), encoding="utf-8")

@@ -18,9 +18,9 @@ FLOOR = {"reference_floor": 0.6875, "score_beyond_floor": 0.1234, "beyond_floor_
          "beyond_floor_ci_high": 0.2, "true_score": 0.0512}  # fmt: skip
 
 
-def over_sessions(sensor, estimator="lasso", score=0.5, **more):
-    """A row over six sessions, whose errors rise alike."""
-    sums = [[10 * (score + 0.01 * place) ** 2, 10.0] for place in range(6)]
+def over_sessions(sensor, estimator="lasso", score=0.5, spread=(0.0, 0.01, 0.02, 0.03, 0.04, 0.05), **more):
+    """A row over six sessions; `spread` is added to its errors."""
+    sums = [[10 * (score + one) ** 2, 10.0] for one in spread]
     kept = {"unit": "session", "names": list("abcdef"), "strata": None, "sums": sums}
     more |= {"replicates": kept, "n_replicates": 6, "replicate_unit": "session", "simulated": False}
     return row(sensor, estimator, score, **more)
@@ -39,6 +39,13 @@ def test_the_best_stands_first_and_equal_scores_share_a_place(scores, more, foun
     for order in (rows, rows[::-1]):
         (block,) = build_table(order).blocks
         assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == found
+
+
+@pytest.mark.parametrize(("spread", "mark"), [((0.2,) * 6, ""), ((-0.2, 0.4, -0.1, 0.4, -0.2, 0.4), "*")])
+def test_an_answer_is_marked_whose_difference_from_the_trivial_one_may_be_0(spread, mark):
+    rows = [over_sessions("a"), over_sessions("a", "mean", spread=spread, is_baseline=True) | {"score": 0.6}]
+    (block,) = build_table(rows).blocks
+    assert (block.lines[0].kind, block.lines[0].texts["notes"]) == ("result", mark)
 
 
 @settings(max_examples=40)

@@ -1,4 +1,4 @@
-"""Groups the cells of one figure, which differ in their sensor alone, and writes heading and caption of the figure."""
+"""Groups the cells of one figure, which differ only in their sensor, and writes its heading and caption."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Sketch(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """One sensor's cell, with what it answered."""
+    """The cell of one sensor, with its answers."""
 
     row: Row
     """Row of the replicate that is shown."""

@@ -26,7 +26,7 @@ PNG_DPI, RASTER_DPI = 150, 300
 
 BLACK, GREY = "#000000", "#767676"
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", BLACK)
-"""Colours of things without an order: Okabe and Ito 2008, Color universal design."""
+"""Colours without an order: Okabe and Ito 2008, Color universal design."""
 MARKERS = "os^DvPX*<>"
 
 _RC: dict[str, Any] = {
@@ -76,7 +76,7 @@ def panels(
 
 
 def ordered(n: int) -> list[Any]:
-    """Return `n` colours in an order that grey shows too; the ends, which vanish on paper, are left out."""
+    """Return `n` colours whose order is visible in grey too; the ends, which vanish on paper, are left out."""
     import matplotlib
 
     return [matplotlib.colormaps["viridis"](value) for value in np.linspace(0.0, 0.88, n)]
