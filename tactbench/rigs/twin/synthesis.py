@@ -15,7 +15,6 @@ from tactbench.plugin import (
     ChannelKind,
     ChannelSpec,
     FloatArray,
-    NotApplicable,
     Scalar,
     Scene,
     SensorDescriptor,
@@ -184,15 +183,8 @@ class Synthesis:
 
     @property
     def skin(self) -> Skin:
-        """The sensor's skin.
-
-        Raises
-        ------
-        NotApplicable
-            If the sensor declares none.
-        """
-        if self.sensor.spec.skin is None:
-            raise NotApplicable(f"{self.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
+        """The sensor's skin; without one no scene is planned."""
+        assert self.sensor.spec.skin is not None
         return self.sensor.spec.skin
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:

@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from tactbench.plugin import ChannelSpec, PhysicalRange, Quantity, Source, StreamSpec, derived, measured, sourced
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    PhysicalRange,
+    Quantity,
+    Source,
+    StreamSpec,
+    derived,
+    measured,
+    sourced,
+)
 from tactbench.sensors.biotac.electrodes import ELECTRODES, NAMES, TABLE, Electrode
 
 PAPER = "Karl et al. 2016, table I"
@@ -44,13 +55,15 @@ def _unit(normal: tuple[float, float, float]) -> tuple[float, float, float]:
     return (x / length, y / length, z / length)
 
 
+def _converted(name: str, kind: ChannelKind, rest: Quantity, **more: Any) -> ChannelSpec:
+    return ChannelSpec(name=name, kind=kind, lower=0.0, upper=CONVERTER_TOP, rest=rest, **more)
+
+
 def _electrode(name: str, place: Electrode, rest: float) -> ChannelSpec:
-    return ChannelSpec(
-        name=name,
-        kind="taxel",
-        lower=0.0,
-        upper=CONVERTER_TOP,
-        rest=derived(rest, "count", _REST_FROM),
+    return _converted(
+        name,
+        "taxel",
+        derived(rest, "count", _REST_FROM),
         # Falls under the contact, where the film thins; rises elsewhere, where the fluid goes.
         sign=0,
         position_m=(place.x_mm * 1e-3, place.y_mm * 1e-3, place.z_mm * 1e-3),
@@ -62,25 +75,7 @@ def _electrode(name: str, place: Electrode, rest: float) -> ChannelSpec:
     )
 
 
-def _converter(
-    name: str,
-    kind: str,
-    rest: Quantity,
-    *,
-    sign: int = 0,
-    scale: Quantity | None = None,
-    measures: PhysicalRange | None = None,
-    band: PhysicalRange | None = None,
-) -> ChannelSpec:
-    return ChannelSpec.model_validate(
-        {
-            "name": name, "kind": kind, "lower": 0.0, "upper": CONVERTER_TOP,
-            "rest": rest, "sign": sign, "scale": scale, "measures": measures, "band": band,
-        }
-    )  # fmt: skip
-
-
-_PDC = _converter(
+_PDC = _converted(
     "PDC",
     "dc_pressure",
     measured(2500.0, "count", "2404-2460 on one BioTac, 2583-2593 on two BioTac SP"),
@@ -90,7 +85,7 @@ _PDC = _converter(
     band=_stated(0.0, 1040.0, "Hz", MANUAL),
 )
 # Counts rise with temperature, not with load: 4025 / ln((155183 - 46555 x)/x) - 273.15 degC with x = TDC/4095.
-_TDC = _converter(
+_TDC = _converted(
     "TDC",
     "dc_temperature",
     measured(2576.0, "count", "2559-2592 on BioTac SP, about 57 degC: the core is heated"),
@@ -98,13 +93,13 @@ _TDC = _converter(
     band=_stated(0.0, 22.6, "Hz", MANUAL),
 )
 # No physical range: the maker's formula gives -3 degC/s at mid-scale, outside its own 0-1 degC/s.
-_TAC = _converter(
+_TAC = _converted(
     "TAC",
     "ac_temperature",
     measured(2037.0, "count", "2032-2042 on BioTac SP"),
     band=_stated(0.45, 22.6, "Hz", f"{PAPER}; {MANUAL} has 0.45 Hz in its table and 0.25 Hz in its text"),
 )
-_PAC = _converter(
+_PAC = _converted(
     "PAC",
     "ac_pressure",
     measured(2043.0, "count", "2040-2045 on BioTac SP"),

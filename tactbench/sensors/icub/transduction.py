@@ -59,15 +59,6 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
 
     C/C0 is ``sum W_i h / (h - u)`` over a taxel's cells, with the plates never nearer than `least_gap` of h.
 
-    Parameters
-    ----------
-    sensor
-        The fingertip's spec, perhaps with other parameters.
-    grid
-        The grid on which skin states will come.
-    channel_names
-        Names of taxels.
-
     Raises
     ------
     RigError

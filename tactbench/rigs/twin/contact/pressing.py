@@ -52,7 +52,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     if not names:
         return press, whole_skin
     grid = press.medium.grid
-    read = _reader(run.sensor, grid, names, fidelity)
+    read = _reader(run.sensor, grid, names)
     if not (run.tangential or run.sensor.spec.reads_shear):
         return press, read
     from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
@@ -88,13 +88,11 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
     )
 
 
-def _reader(
-    sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
-) -> Callable[[SkinState], FloatArray]:
+def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:
     """Return the sensor's transducer, with a check of each result."""
     try:
         factory: TransducerFactory = load_object(sensor.transducer or "")
-        transducer: Transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
+        transducer: Transducer = factory(sensor.spec, grid, names)
     except RigError as error:
         raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
 
