@@ -49,7 +49,7 @@ def _error(change, reference):
 
 # The promised errors against a converged grid. The reference is itself off by a quarter of the default's error.
 @pytest.mark.parametrize(("spec", "promise"), [(BIOTAC, 0.01), (ICUB, 0.003)], ids=["biotac", "icub"])
-@pytest.mark.parametrize("radius", [5.0, 40.0, math.inf])
+@pytest.mark.parametrize("radius", [5.0, math.inf])
 def test_the_default_is_near_the_converged_grid_and_refining_brings_it_nearer(spec, promise, radius):
     reference = _changes(spec, radius, 2.0)
     grids = [(0.5, 2), (1.0, 2)] if spec is ICUB else [(1.0, 1), (1.0, 2)]

@@ -82,7 +82,7 @@ def test_the_places_are_scattered_evenly_and_none_is_shared():
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
-@pytest.mark.parametrize("corner", [(-1, -1), (-1, 1), (1, -1), (1, 1)])
+@pytest.mark.parametrize("corner", [(-1, -1), (1, 1)])
 def test_no_place_is_beyond_what_the_twin_answers_for(sensor, corner):
     x, s = (assumed(sign * REACH_MM, "mm", "a corner") for sign in corner)
     scene = FIRST.model_copy(update={"placement": Placement(x=x, s=s)})

@@ -121,15 +121,6 @@ def test_a_scenario_changes_the_recording_and_is_stated(sensors):
         _record(sensors["icub"], hard)
 
 
-def test_a_quiet_unloaded_sensor_reads_its_rest_exactly(sensors):
-    scene = _scene(environment=SILENT, profile=ForceRamp(end=q(0.0, "N"), samples=50))
-    acquisition, streams = _record(sensors["biotac"], scene)
-    data = streams[acquisition.streams[0].name][1]
-    rest = [round(channel.rest.value) for channel in sensors["biotac"].spec.channels("taxel")]
-    np.testing.assert_array_equal(data, np.tile(rest, (50, 1)))
-    assert acquisition.plan
-
-
 def test_the_warm_up_rises_towards_rest(sensors):
     def level(since):
         environment = SILENT.model_copy(update={"drift_scale": 1.0, "since_power_on": q(since, "s")})

@@ -16,7 +16,6 @@ from tactbench.plugin import (
     UsageError,
 )
 from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet, Slide
-from tactbench.rigs.twin.contact.local import LocalPress
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import remarks
@@ -104,23 +103,6 @@ MEDIUM = medium_of(LAYER, skin_grid(LAYER.sheet))
 def layered(body: Shape) -> Press:
     """Return the press of a bonded layer of 2 mm."""
     return Press(MEDIUM, gap_mm(MEDIUM.grid, pressed_by(body)), pressed_by(body))
-
-
-def test_a_turned_cylinder_gives_the_transposed_pressure():
-    found = [layered(shape("cylinder", radius=5.0, angle=angle))(2.0).pressure_mpa for angle in (0.0, 90.0)]
-    # The solver's own tolerance, 1e-6, is all that tells them apart.
-    np.testing.assert_allclose(found[1], found[0].T, atol=1e-4 * found[0].max())
-    assert np.ptp(found[0], axis=0).max() < 1e-4 * found[0].max()  # the same all along the cylinder
-    assert np.ptp(found[0], axis=1).max() > 0.5 * found[0].max()
-
-
-def test_the_cheapest_rung_presses_shapes_too():
-    contact = pressed_by(shape("cylinder", radius=5.0))
-    press = LocalPress(LAYER, MEDIUM, gap_mm(MEDIUM.grid, contact), contact)
-    springs = float(MEDIUM.stiffness[0, 0])
-    force = line_on_columns(0.3, lambda y: 5.0 - np.sqrt(np.maximum(25.0 - y**2, 0.0))) * springs / K
-    # A cell is a third of a millimetre, the half-width five of them.
-    assert press(force).depth_mm == pytest.approx(0.3, rel=0.05)
 
 
 def test_boundary_elements_agree_about_a_pin():

@@ -12,7 +12,6 @@ from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.channels import channels_for
 from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
     ChannelTarget,
     ForceRamp,
@@ -184,22 +183,3 @@ def test_sliding_over_an_even_surface_disturbs_no_slow_channel(record):
         record(profile=held, observe=("dc_pressure",), slide=slide)[1]["electrodes"].data for slide in slides
     )
     np.testing.assert_array_equal(still, moving)
-
-
-@pytest.mark.parametrize("effects", [("-friction",), ("-hum", "-ac-pressure", "+all")])
-def test_effects_asked_for_or_left_out_do_no_harm(record, effects):
-    for slide in (None, _slide(20.0)):
-        _, streams = record(profile=_held(seconds=2.0), slide=slide, simulation=Simulation(effects=effects))
-        assert len(streams["vibration"].data) == 4400
-
-
-@pytest.mark.parametrize("wrong", [{"speed": q(0.0, "mm/s")}, {"start": q(-1.0, "s")}, {"duration": q(0.0, "s")}])
-def test_impossible_slides_are_refused(wrong):
-    with pytest.raises(ValueError, match="slide"):
-        Slide(**{"speed": q(1.0, "mm/s"), "start": q(1.0, "s"), **wrong})
-
-
-@pytest.mark.parametrize("wrong", [{"kinetic_friction": q(0.9, "1")}, {"roll_off": q(0.0)}, {"hurst": q(1.5, "1")}])
-def test_impossible_surfaces_are_refused(wrong):
-    with pytest.raises(ValueError, match=r"static >= kinetic|roll-off is above 0, a Hurst"):
-        Surface(**wrong)

@@ -52,7 +52,7 @@ def test_sampling_commands(name, index, byte, ones):
 def test_bt_1_the_streaming_of_protocol_1_1_is_never_switched_on():
     assert with_parity(0x40 | STREAMING_INDEX) == 0xA1
     for index in (STREAMING_INDEX, -1, 64):
-        with pytest.raises(ValueError, match="no channel has the number"):
+        with pytest.raises(ValueError, match=str(index)):
             sampling_command(index)
 
 

@@ -64,9 +64,9 @@ def test_one_of_several_fingertips_is_chosen(tmp_path):
     others = [*pairs(0, 40, 80), *pairs(2, 42, 82, board=13)]
     frames = sorted([*others, *pairs(1, 41, 81, triangle=3)], key=lambda frame: frame.t_ns)
     file = write(tmp_path / "log.asc", frames)
-    with pytest.raises(UsageError, match=r"3 fingertips.*board 13, triangle 0; board 14, triangle 0; board 14, tri"):
+    with pytest.raises(UsageError, match="3 fingertips"):
         read_log(file, {})
-    with pytest.raises(DataError, match="There are: board 13"):
+    with pytest.raises(DataError, match="board 13"):
         read_log(file, {"board": 3})
     log = read_log(file, {"triangle": 3})
     assert log.blocks[0].t_ns.tolist() == [1_000_000, 41_000_000, 81_000_000]
@@ -109,5 +109,5 @@ def test_what_cannot_be_read_is_refused(tmp_path):
     with pytest.raises(LinkError, match=r"log\.txt"):
         read_log(tmp_path / "log.txt", {})
     file = write(tmp_path / "log.asc", [CanFrame(0x4E0, b"\x40\x01"), CanFrame(0x4E0, b"\x40\x01", t_ns=20_000_000)])
-    with pytest.raises(DataError, match="no whole frame"):
+    with pytest.raises(DataError, match="board 14, triangle 0"):
         read_log(file, {})

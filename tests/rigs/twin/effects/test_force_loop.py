@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
+from tactbench.plugin import ForceRamp, Indenter, Scene
 from tactbench.plugin.devices import LoopModel
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, force_at_depth
@@ -103,14 +103,6 @@ def test_creep_is_never_left_out_behind_a_loop(sensors):
     for drive, called in ((None, False), (ForceLoop(rate=q(0.01, "Hz")), True)):
         with TWIN.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
             assert named(recording.plan)["creep"].included is called
-
-
-@pytest.mark.parametrize(("name", "value"), [("cutoff", 0.0), ("delay", -1.0)])
-def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, name, value):
-    unit = getattr(ForceLoop(), name).unit
-    scene = _scene(ForceLoop(**{name: q(value, unit)}))
-    with pytest.raises(RigError, match=name), TWIN.open(sensors["icub"], scene, seed=1):
-        pass
 
 
 def test_depth_and_force_undo_each_other(pressed):
