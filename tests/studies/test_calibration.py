@@ -11,8 +11,7 @@ from tests.conftest import ROOT
 sys.path.append(str(ROOT))  # behind everything installed
 
 from studies.calibration.__main__ import DOCUMENT, HERE, RESULTS, calibrate, document
-from studies.calibration.analysis import accept, by_fitted
-from studies.calibration.draws import Draw, parameters_of, read, roughness, write
+from studies.calibration.draws import parameters_of, read, roughness, write
 
 PROCEDURE = yaml.safe_load("""
 seed: 3
@@ -73,15 +72,6 @@ def test_the_page_has_the_tables_of_the_stored_results_and_every_prior():
     text = (HERE / "README.md").read_text(encoding="utf-8")
     priors = [one["prior"] for one in read(RESULTS).procedure["nuisances"]]
     assert [one for one in priors if f"{one['low']:g} to {one['high']:g}" not in text] == []
-
-
-def test_near_draws_are_accepted_and_the_nearest_where_they_are_few():
-    draws = [Draw(number, 0, {}, {"a": float(number)}) for number in range(10)]
-    target = {"output": "a", "value": 4.0, "scale": 0.5, "use": "fitted"}
-    near = accept({"tolerance": 2.0, "at_least": 0}, draws, [target])
-    assert ([draw.number for draw in near.draws], near.near, near.reach) == ([3, 4, 5], 3, 2.0)
-    few = by_fitted({"published": [target], "tolerance": 0.5, "at_least": 5}, draws)
-    assert ([draw.number for draw in few.draws], few.near, few.reach) == ([2, 3, 4, 5, 6], 1, 4.0)
 
 
 def test_roughness_is_the_white_noise_of_predictions_and_of_no_rise():

@@ -60,8 +60,7 @@ def test_no_clock_tells_when_a_slip_begins():
     assert all(len(set(found)) == len(found) for found in by_condition.values())
 
 
-@pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_labels_agree_with_what_the_twin_knows(sensor):
+def test_labels_agree_with_what_the_twin_knows():
     """Frames by :func:`slip_labels` against the twin's own state: slipped yet, and its stick ratio.
 
     Where they may differ: the label of gross slip begins 0.1 mm after it (5 of 2300 samples at 10 mm/s), or before the
@@ -73,7 +72,7 @@ def test_labels_agree_with_what_the_twin_knows(sensor):
     scenes = [scene for scene in scenes if scene.name.endswith("-test")]
     assert len(scenes) == 14
     for scene in scenes:
-        acquisition = record(sensor, scene, observe=("taxel",))
+        acquisition = record("biotac", scene, observe=("taxel",))
         t_ns, found = columns(acquisition, "force_torque")
         labels = slip_labels(
             t_ns, found["slip"], found["tangential"], found["normal"], scene.labels["friction_coefficient"], THRESHOLDS
