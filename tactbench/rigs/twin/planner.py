@@ -106,7 +106,7 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
         if not meant:
             groups = sorted({group for effect in effects for group in effect.groups} | {"all"})
             raise UsageError(
-                f"No installed effect is called {name!r}, as {word!r} asks.",
+                f"No installed effect is called {name!r}, which {word!r} names.",
                 hint=f"Effects: {', '.join(effect.name for effect in effects)}. Groups: {', '.join(groups)}.",
             )
         for found in meant:
@@ -127,9 +127,9 @@ def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reaso
 
 
 def _entry(effect: EffectDescriptor, reason: Reason, taken: bool, *, asked: bool) -> PlanEntry:
-    text = f"asked for; else: {reason.text}" if asked and taken else reason.text
+    text = f"included as stated; else: {reason.text}" if asked and taken else reason.text
     if asked and not taken:
-        text = f"left out as asked; else: {reason.text}" if reason.called_for else reason.text
+        text = f"left out as stated; else: {reason.text}" if reason.called_for else reason.text
     # An effect that was called for and is left out all the same: what it would have changed is no bound any more.
     change = None if asked and not taken and reason.called_for else reason.change
     return PlanEntry(effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked)

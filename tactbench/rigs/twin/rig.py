@@ -88,16 +88,10 @@ class TwinAcquisition:
 
 
 class Twin:
-    """The simulated rig.
+    """The simulated rig, with all installed shapes of indenters.
 
-    Parameters
-    ----------
-    effects
-        Candidates for every scene; a plan takes from them what the scene calls for.
-    indenters
-        All installed shapes of indenters.
-    named_effects
-        Candidates where the sensor or the scene names them.
+    `effects` are candidates for every scene: a plan takes from them what the scene calls for. `named_effects` are
+    candidates where the sensor or the scene names them.
     """
 
     def __init__(
@@ -117,7 +111,7 @@ class Twin:
         if missing:
             raise NotApplicable(
                 f"{sensor.name} is simulated with the effects {', '.join(sorted(missing))}, which are not installed.",
-                hint="Install the package that brings them.",
+                hint="Install the package that has them.",
             )
         return found
 

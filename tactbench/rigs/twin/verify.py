@@ -45,10 +45,8 @@ def verdicts() -> Iterator[Verdict]:
 def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
     """Return the change [count] by the effects left out of `scene`, and the bound on it by the plan.
 
-    Returns
-    -------
-    largest difference of any observed reading, before it is rounded, between a run with every effect and one with the
-    plan's; the sum of the bounds that the plan states.
+    The change is the largest difference of any observed reading, before it is rounded, between a run with every effect
+    and one with the plan's; the bound is the sum of those that the plan states.
     """
     every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
     simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})

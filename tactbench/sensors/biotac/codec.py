@@ -1,9 +1,8 @@
 """The BioTac's words on SPI: commands, replies and properties to bytes and back.
 
-Nothing here reads, writes or waits. Two public sources state the protocol and agree where not said otherwise: [driver]
-kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
-the SynTouch BioTac SP product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Tested
-against an emulator written from the same sources; it has never met a real sensor.
+Two public sources state the protocol and agree where not stated otherwise: [driver] kth-ros-pkg/biotac_driver,
+``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual] the SynTouch BioTac SP
+product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Never tested with a real sensor.
 
 SPI mode 0, most significant bit first, select active low, 500 kHz to 10 MHz [sourced: both]. The host sends a command
 of two bytes, deselects for 50 us, selects again and clocks the reply out. Every byte but a property's is seven bits and
@@ -84,7 +83,7 @@ PROPERTIES: dict[str, Property] = {
 
 
 class Fault(StrEnum):
-    """What can be wrong with one reply."""
+    """Faults of one reply."""
 
     PARITY = "parity"
     RESERVED = "reserved bits"

@@ -1,6 +1,6 @@
 """Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
 
-No input or output, no clock of its own: whoever drives the bus asks for the next batch, sends it, and hands back what
+No input or output, no clock of its own: the driver of the bus takes the next batch, sends it, and returns what
 was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
 """
 
@@ -63,7 +63,7 @@ def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | Non
     frame
         Names of channels in the order of their commands.
     rate_hz
-        Commands a second; None: nobody states it.
+        Commands a second; None: not stated.
     source
         Where the rates are from, if they are not the spec's.
     """
@@ -318,9 +318,9 @@ class FrameBatches(FrameRows):
         device_ns
             When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
             without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
-            if no pause was longer than asked for.
+            if no pause was longer than requested.
         skipped
-            Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
+            Words that were not requested in their time so far, as whole frames: sequence numbers stay with the time.
         """
         sampled_ns, end_ns = self.timing(first)
         stride = 2 * self._commands

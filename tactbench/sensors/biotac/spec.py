@@ -110,7 +110,7 @@ THERMAL: dict[str, Quantity] = {
     "conductivity_coefficient": assumed(
         0.02,
         "1/K",
-        "at 25 degC, where salts in water gain about 2 % per kelvin (Robinson and Stokes 1959); NaBr not told",
+        "at 25 degC, where salts in water gain about 2 % per kelvin (Robinson and Stokes 1959); NaBr not stated",
     ),
 }
 

@@ -3,14 +3,15 @@
 A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
 [sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
 ``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
-(IM: ``CanBusSkin.cpp``) unless said. Nothing here has met a real board.
+(IM: ``CanBusSkin.cpp``) unless stated. Nothing here has met a real board.
 """
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -97,6 +98,15 @@ class VersionRequest:
 
 
 Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | OldSetup | OldSetup2 | VersionRequest
+_LAYOUTS: dict[type[Command], tuple[int, str, bytes, bytes]] = {
+    BoardSetup: (0x4D, "<3B", b"", b""),
+    TriangleSetup: (0x50, "<4BH", b"", b""),
+    Transmit: (0x07, "<B", b"", b""),
+    OldSetup: (0x4C, "<BHH", b"\x01\x01", b""),
+    OldSetup2: (0x4E, "<4BH", b"", b"\x0a"),
+    VersionRequest: (0x1C, "<2B", b"", b""),
+}
+"""First byte of each command, layout of its fields, and fixed bytes before and after them."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +118,7 @@ class Version:
     firmware: tuple[int, int, int]
     protocol: tuple[int, int]
     fits: bool
-    """The board speaks the protocol asked for."""
+    """The board speaks the requested protocol."""
 
 
 def polling_id(board: int, source: int = 0) -> int:
@@ -140,21 +150,17 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
     UsageError
         If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
     """
-    match command:
-        case BoardSetup(skin_type, period_ms, no_load):
-            numbers = [0x4D, skin_type, period_ms, no_load]
-        case TriangleSetup(first, last, shift, enabled, cdc):
-            _within("first triangle", first, _within("last triangle", last, 15))
-            numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
-        case Transmit(on):
-            numbers = [0x07, 0 if on else 1]
-        case OldSetup(timer, cdc, time):
-            numbers = [0x4C, 1, 1, timer, *_low_high(cdc), *_low_high(time)]
-        case OldSetup2(shift, shift_3_1, no_load, param, enabled_mask):
-            numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
-        case VersionRequest(major, minor):
-            numbers = [0x1C, major, minor]
-    return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
+    code, layout, before, after = _LAYOUTS[type(command)]
+    if isinstance(command, TriangleSetup):
+        _within("first triangle", command.first, _within("last triangle", command.last, 15))
+    numbers = (not command.on,) if isinstance(command, Transmit) else astuple(command)
+    try:
+        data = bytes([code]) + before + struct.pack(layout, *numbers) + after
+    except struct.error as error:
+        raise UsageError(
+            f"{command} has a number that does not fit its field.", hint=f"Correct it: {error}."
+        ) from error
+    return CanFrame(polling_id(board, source), data)
 
 
 def read_command(frame: CanFrame) -> tuple[int, Command] | None:
@@ -162,22 +168,21 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
     if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
         return None
     board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
-    found: Command
-    if code == 0x4D and len(data) >= 3:
-        found = BoardSetup(*data[:3])
-    elif code == 0x50 and len(data) >= 6:
-        found = TriangleSetup(data[0], data[1], data[2], bool(data[3] & 1), data[4] | data[5] << 8)
-    elif code == 0x07 and data:
-        found = Transmit(data[0] == 0)
-    elif code == 0x4C and len(data) >= 7:
-        found = OldSetup(data[2], data[3] | data[4] << 8, data[5] | data[6] << 8)
-    elif code == 0x4E and len(data) >= 6:
-        found = OldSetup2(data[0], data[1], data[2], data[3], data[4] | data[5] << 8)
-    elif code == 0x1C and len(data) < 7:  # with 7 it is a board's answer
-        found = VersionRequest(*(*data, 0, 0)[:2])
-    else:
+    kind = next((kind for kind, layout in _LAYOUTS.items() if layout[0] == code), None)
+    if kind is None or (kind is VersionRequest and len(data) >= 7):  # with 7 it is a board's answer
         return None
-    return board, found
+    _, layout, before, _ = _LAYOUTS[kind]
+    if kind is VersionRequest:
+        data = data + bytes(2)
+    if len(data) < len(before) + struct.calcsize(layout):
+        return None
+    numbers = struct.unpack_from(layout, data, len(before))
+    if kind is Transmit:
+        return board, Transmit(numbers[0] == 0)
+    if kind is TriangleSetup:
+        first, last, shift, enabled, cdc_offset = numbers
+        return board, TriangleSetup(first, last, shift, bool(enabled & 1), cdc_offset)
+    return board, kind(*numbers)
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
@@ -434,9 +439,3 @@ def _within(what: str, number: int, most: int) -> int:
     if not 0 <= number <= most:
         raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
     return number
-
-
-def _low_high(number: int) -> tuple[int, int]:
-    """Little-endian bytes of a 16-bit number."""
-    _within("a 16-bit number", number, 0xFFFF)
-    return number & 0xFF, number >> 8

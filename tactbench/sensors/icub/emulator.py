@@ -1,4 +1,4 @@
-"""A board with an iCub fingertip, alone on a CAN bus, as a model without input or output: frames in, frames out.
+"""A board with an iCub fingertip, the only one on a CAN bus, as a model without input or output: frames in, frames out.
 
 What the board does is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
 ``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; where the model guesses, it is
@@ -84,7 +84,7 @@ class BoardFault(Fault):
     }
 
     half: Literal["head", "tail"] | None = None
-    """Which frames are dropped, doubled or late; None: both."""
+    """Half of the sample whose frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
     """Bits of the error word."""

@@ -211,7 +211,7 @@ def test_when_no_reply_comes_it_gives_up_and_goes_on_in_time():
     assert np.abs(slow["sequence"] - frames).max() <= 0.5
     # Half a second of patience and four frames, to a time-out of the reads.
     assert 50 <= slow["sequence"][2] - 2 <= 70
-    assert counts["frames not asked for"] == slow["sequence"][2] - 6
+    assert counts["frames not requested"] == slow["sequence"][2] - 6
     assert counts["batches late"] == 1
 
 
@@ -222,7 +222,7 @@ def test_a_host_that_is_late_leaves_a_gap_as_long_as_the_pause():
         before = read_frames(driver, 5)
         clock.now_ns += 500_000_000
         after = read_frames(driver, 10)["electrodes"]
-        assert driver.counts == {"batches late": 1, "frames not asked for": 46}
+        assert driver.counts == {"batches late": 1, "frames not requested": 46}
     assert before["electrodes"]["sequence"].tolist() == [*range(5)]
     assert after["sequence"][0] == 5
     (gap,) = np.flatnonzero(np.diff(after["sequence"]) > 1)
@@ -347,8 +347,8 @@ def test_a_second_at_full_rate_through_the_bridge():
         streams = read_frames(driver, 100)
         counts = driver.counts
     slow, fast = streams["electrodes"], streams["vibration"]
-    assert set(counts) <= {"batches late", "frames not asked for"}
-    rows, unasked = len(slow["sequence"]), counts.get("frames not asked for", 0)
+    assert set(counts) <= {"batches late", "frames not requested"}
+    rows, unasked = len(slow["sequence"]), counts.get("frames not requested", 0)
     assert (slow["sequence"][0], slow["sequence"][-1]) == (0, rows - 1 + unasked)
     assert not any(stream["quality"].any() for stream in streams.values())
     slow["sequence"], fast["sequence"] = np.arange(rows), np.arange(22 * rows)

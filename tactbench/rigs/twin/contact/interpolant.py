@@ -56,19 +56,10 @@ _ROUNDING_N = 0.05
 
 
 class Interpolant:
-    """Piecewise cubic in the load.
+    """Piecewise cubic in (n,) ascending loads, n >= 2, of (n, c) values.
 
-    Parameters
-    ----------
-    loads
-        (n,) ascending, n >= 2.
-    values
-        (n, c)
-    breaks
-        Indices of nodes where one cubic ends and the next begins.
-    power
-        Beyond the last break the cubics run in ``(load - load at that break) ** power``, rounded off; elsewhere in the
-        load itself.
+    `breaks` are indices of nodes where one cubic ends and the next begins. Beyond the last of them the cubics run in
+    ``(load - load at that break) ** power``, rounded off; elsewhere in the load itself.
     """
 
     def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:

@@ -1,6 +1,6 @@
 """Tables of readings against load, solved at a few loads only.
 
-Quasi-static contact depends on time through the force alone. So the skin is solved at a few loads, all wanted readings
+Quasi-static contact depends on time only through the force. So the skin is solved at a few loads, all wanted readings
 are kept, and a shape-preserving cubic between the nodes answers for every sample. What an interpolant through all
 *other* nodes misses at a node is the reported bound: an interval twice as wide errs by more than the one at hand.
 """
@@ -138,20 +138,10 @@ def build_table(
     tolerance: FloatArray,
     most_nodes: int = 14,
 ) -> LoadTable:
-    """Solve and tabulate one contact.
+    """Solve and tabulate the (channels,) readings of one contact up to `largest_n`; without load, the rest twice.
 
-    Parameters
-    ----------
-    press
-        Solves the skin for one force.
-    read
-        The sensor's noise-free readings of a state: (channels,).
-    largest_n
-        Upper end of the table; a table of a scene without load has the rest state twice.
-    tolerance
-        (channels,) wanted bound on the interpolation error.
-    most_nodes
-        Nodes after which refining ends even if the bound is missed: the achieved one is reported.
+    `tolerance` (channels,) is the wanted bound on the interpolation error; at `most_nodes` refining ends even if it is
+    missed: the achieved one is reported.
     """
     builder = _Builder(press, read)
     if not largest_n > 0:

@@ -58,15 +58,7 @@ class Solution:
 
 
 class NewtonSolver:
-    """Solver of the contact of one medium through one gap.
-
-    Parameters
-    ----------
-    medium
-        The skin.
-    gap_mm
-        (nx, ns) gap at zero approach.
-    """
+    """Solver of the contact of one medium through one (nx, ns) gap at zero approach."""
 
     def __init__(self, medium: Medium, gap_mm: FloatArray) -> None:
         self.medium = medium
@@ -86,10 +78,10 @@ class NewtonSolver:
     def start(self, force_n: float) -> FloatArray:
         """Return the unloaded skin with the indenter just touching: a guess for a first load of `force_n`."""
         vector = np.zeros(self._spectrum.size + 1)
-        # What one cell alone would take: never more than the answer, so that a piconewton is not met from 1e10 times
-        # its own depth. From 0.02 mm on the guess would leave the contact's shape behind.
-        alone = force_n / (self._spectrum.area_mm2 * self._k)
-        vector[-1] = float(self.gap_mm.min()) + min(0.02, alone)
+        # The depth of a single cell, never more than the answer: a piconewton does not start from 1e10 times its depth.
+        # From 0.02 mm on the guess would leave the contact's shape behind.
+        single = force_n / (self._spectrum.area_mm2 * self._k)
+        vector[-1] = float(self.gap_mm.min()) + min(0.02, single)
         return vector
 
     def solve(self, force_n: float, guess: FloatArray | None = None, *, tolerance: float = TOLERANCE) -> Solution:
@@ -102,7 +94,7 @@ class NewtonSolver:
         guess
             State of a neighbouring load (its ``vector``).
         tolerance
-            Largest relative residual. Where rounding of the equations' terms alone is more, what rounding leaves is
+            Largest relative residual. Where rounding of the equations' terms is more, what rounding leaves is
             returned, up to :data:`TOLERANCE`; the solution's residual states it.
 
         Raises
@@ -318,7 +310,7 @@ class Preconditioner:
         total = float(contact.sum())
         matrix[size, :size] = -coupling
         matrix[:size, size] = -coupling
-        # A floor for the approach alone: without contact its own stiffness would vanish.
+        # A floor for the approach: without contact its own stiffness would vanish.
         matrix[size, size] = total * (1 + 1e-12) + 1e-6 * self._medium.contact_stiffness
         self._factor, _ = self._lapack.dpotrf(matrix, lower=1, clean=0)
         # Stiff modes are short waves: they live where the local stiffness is large, so its mean is too little for them.
