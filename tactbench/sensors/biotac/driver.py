@@ -178,7 +178,7 @@ class BioTacDriver(Driver):
 
     def _property(self, name: str) -> bytes:
         select, pauses = self._options.select, (round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us")))
-        data = (property_command(name), bytes(PROPERTIES[name].length))
+        data = (property_command(name), bytes(PROPERTIES[name][1]))
         number = self._link.send([SpiStep(part, select, pause) for part, pause in zip(data, pauses, strict=True)])
         while True:
             reply = self._link.receive(PATIENCE_S)

@@ -17,7 +17,6 @@ from tactbench.plugin import Block, Quality, Source, StreamSpec
 from tactbench.plugin.devices import SpiStep
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
-    CHANNELS,
     COMMAND_RATE,
     INDEX,
     RESEND,
@@ -58,14 +57,7 @@ def quality_of(reply: Reply) -> Quality:
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
     """Return the spec's streams as a frame fills them: with its channels only, at its rates.
 
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-    rate_hz
-        Commands a second; None: not stated.
-    source
-        Where the rates are from, if they are not the spec's.
+    `rate_hz` is of commands (None: not stated), `source` that of rates that are not the spec's.
     """
     found = []
     for stream in STREAMS:
@@ -95,23 +87,10 @@ class FrameRows:
 
     The k-th word of a channel within a frame belongs to the k-th of that stream's rows. A row ends when all of its
     words are there or a word of another row comes; words that did not come are MISSING. A row of which no word came is
-    absent: a gap in the sequence numbers.
-
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-
-    Raises
-    ------
-    ValueError
-        If a name is none of the sensor's channels, or there is none.
+    absent: a gap in the sequence numbers. A frame is the names of channels in the order of their commands.
     """
 
     def __init__(self, frame: tuple[str, ...]) -> None:
-        unknown = [name for name in frame if name not in CHANNELS]
-        if unknown or not frame:
-            raise ValueError(f"a frame is of one or more of {', '.join(CHANNELS)}; got {', '.join(unknown) or 'none'}")
         self.frame = frame
         self._streams = streams_of(frame, None)
         columns = {
@@ -133,19 +112,10 @@ class FrameRows:
     def put(
         self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None
     ) -> None:
-        """Add one word.
+        """Add the word of the command number `position`, counted over all frames; `count` has no meaning if MISSING.
 
-        Parameters
-        ----------
-        position
-            Number of its command since the first of all, frame after frame.
-        count
-            The datum; of no meaning if MISSING.
-        quality
-            What is wrong with it.
-        t_ns, device_ns
-            Its times, nanoseconds of the host's clock and of the adapter's, if they are known. A row has the times of
-            its first word.
+        Its times are nanoseconds of the host's clock and of the adapter's, where known; a row has those of its first
+        word.
         """
         frame, place = divmod(position, len(self.frame))
         k, column, nth = self._places[place]
@@ -220,18 +190,8 @@ class FrameBatches(FrameRows):
     The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
     repeats the word before it cannot be recognised by its bytes.
 
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-    speed_hz
-        Clock of the SPI bus, hertz.
-    select
-        Mask of the sensor's select lines.
-    resends
-        How often each word is requested again.
-    words
-        Words in a batch; None: a frame of them.
+    `speed_hz` is the clock of the SPI bus, `select` the mask of the sensor's select lines, `words` those in a batch
+    (None: a frame).
 
     Attributes
     ----------
@@ -242,7 +202,7 @@ class FrameBatches(FrameRows):
     Raises
     ------
     ValueError
-        For a frame that is none, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
+        If `speed_hz` leaves no time for the words.
     """
 
     def __init__(

@@ -16,7 +16,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, UsageError
+from tactbench.plugin import Block, Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 
 BIT_RATE = 1_000_000
@@ -122,28 +122,17 @@ class Version:
 
 
 def polling_id(board: int, source: int = 0) -> int:
-    """Return the identifier of a command to `board` (15: to all) from `source`; raises UsageError outside 0 to 15."""
-    return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
+    """Return the identifier of a command to `board` (15: to all) from `source`."""
+    return POLLING << 8 | source << 4 | board
 
 
 def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
-    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15.
-
-    `old`: of class 3, as early firmware sends.
-    """
-    kind = OLD_SKIN if old else SKIN
-    return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
+    """Return the identifier of a triangle's two frames; `old`: of class 3, as early firmware sends."""
+    return (OLD_SKIN if old else SKIN) << 8 | board << 4 | triangle
 
 
 def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
-    """Return the frame that carries `command`.
-
-    Parameters
-    ----------
-    board
-        Destination, 0 to 14, or :data:`BROADCAST`.
-    source
-        Sender, 0 for a host.
+    """Return the frame that carries `command` to a board, 0 to 14, or :data:`BROADCAST`, from `source`, 0 for a host.
 
     Raises
     ------
@@ -151,8 +140,8 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
         If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
     """
     code, layout, before, after = _LAYOUTS[type(command)]
-    if isinstance(command, TriangleSetup):
-        _within("first triangle", command.first, _within("last triangle", command.last, 15))
+    if isinstance(command, TriangleSetup) and not 0 <= command.first <= command.last <= 15:
+        raise UsageError(f"Triangles {command.first} to {command.last} do not ascend.", hint="Give 0 to 15.")
     numbers = (not command.on,) if isinstance(command, Transmit) else astuple(command)
     try:
         data = bytes([code]) + before + struct.pack(layout, *numbers) + after
@@ -186,9 +175,9 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
-    """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
-    numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
-    return CanFrame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
+    """Return the answer of `board` to the :class:`VersionRequest` of `to`."""
+    numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, version.fits)
+    return CanFrame(polling_id(to, board), bytes(numbers))
 
 
 def read_version(frame: CanFrame) -> tuple[int, Version] | None:
@@ -204,28 +193,14 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 def skin_frames(
     board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
-    """Return head and tail.
+    """Return head and tail of (12,) readings, 0 to 255.
 
-    Parameters
-    ----------
-    taxels
-        (12,) readings, 0 to 255.
-    word
-        Error word: bit 4 + i is taxel i out of range, then :data:`NO_ACK` and :data:`NOT_CONNECTED`.
-
-    Raises
-    ------
-    UsageError
-        If there are not 12 readings or a number does not fit its field.
+    Bit 4 + i of the error word is taxel i out of range, beside :data:`NO_ACK` and :data:`NOT_CONNECTED`.
     """
-    if len(taxels) != TAXELS:
-        raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
-    values = bytes(_within("a reading", value, 255) for value in taxels)
-    identifier = skin_id(board, triangle, old=old)
-    errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
+    values, identifier = bytes(taxels), skin_id(board, triangle, old=old)
     return (
         CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
-        CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
+        CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + word.to_bytes(2, "big"), t_ns=t_ns),
     )
 
 
@@ -237,14 +212,8 @@ def out_of_range(word: int) -> tuple[int, ...]:
 def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
     """Return the byte a board sends, and whether it calls the taxel out of range [sourced: IF theSkin, fill].
 
-    Parameters
-    ----------
-    change
-        Converter result minus baseline minus drift; pressure makes it positive and the byte smaller.
-    no_load
-        Byte at rest.
-    shift
-        Bits of the change that are dropped (arithmetically).
+    `change` is the converter's result minus baseline minus drift: pressure makes it positive and the byte smaller.
+    `no_load` is the byte at rest, `shift` the bits of the change that are dropped (arithmetically).
     """
     least, most = -((255 - no_load) << shift), no_load << shift
     beyond = change <= 2 * least or change >= 2 * most
@@ -415,27 +384,13 @@ class SkinDecoder:
 
 
 def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:
-    """Return samples of one triangle as a block of the sensor's stream.
+    """Return samples of one triangle as a block of the sensor's stream, without a sequence: the device has no counter.
 
-    Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well]. The block has no
-    sequence, which stands for a device's own counter.
-
-    Raises
-    ------
-    RigError
-        If the samples are of several triangles.
+    Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well].
     """
-    if len({(sample.board, sample.triangle) for sample in samples}) > 1:
-        raise RigError("The samples are of several triangles.", hint="Make one block for each (board, triangle).")
     return Block(
         stream=stream,
         t_ns=np.array([sample.t_ns for sample in samples], dtype=np.int64),
         data=np.array([list(sample.taxels) for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
         quality=np.array([sample.quality for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
     )
-
-
-def _within(what: str, number: int, most: int) -> int:
-    if not 0 <= number <= most:
-        raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
-    return number

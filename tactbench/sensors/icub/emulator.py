@@ -113,14 +113,8 @@ def frame_s(frame: CanFrame) -> float:
 class Bus(DeviceEmulator):
     """A bus with one board, which sends one frame at a time; commands take no time on it [assumed: they are rare].
 
-    Parameters
-    ----------
-    senses
-        Second -> counts of taxels, rounded, and clipped to 0-255; those left out are at rest.
-    board, triangle
-        Where the fingertip is; the board's other triangles have no chip.
-    faults
-        What is wrong with the board; the list may be changed at any time.
+    `senses` maps a second to counts of taxels, rounded and clipped to 0-255; those left out are at rest. The board's
+    triangles beside that of the fingertip have no chip. `faults` may be changed at any time.
     """
 
     def __init__(self, senses: Senses, *, board: int = 14, triangle: int = 0, faults: Iterable[BoardFault] = ()):
