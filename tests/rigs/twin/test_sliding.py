@@ -22,7 +22,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Environment, Slide, Surface
 from tests.oracles.closed_forms import CattaneoMindlin
-from tests.rigs.twin.conftest import SILENT, TWIN, named, q
+from tests.rigs.twin.conftest import SILENT, TWIN, q
 
 DESCRIPTOR = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
 EDGES = (2, 10, 30, 100, 200, 500, 1000)
@@ -141,15 +141,6 @@ def test_a_recorded_stick_ratio_is_that_of_cattaneo_and_mindlin(record):
     # Off by the viscous force alone, 2 z/w V k: 1e-4 of the limit at 1 mm/s. Beyond 99 % of it the radius is a fifth.
     before = found["tangential"][loading] < 0.99 * 0.7834
     assert np.abs(found["stick_ratio"][loading] / sticking - 1)[before].max() < 0.02
-
-
-def test_a_scene_that_only_presses_has_no_tangential_channels(record):
-    meta, streams = record(profile=_held())
-    assert [channel.name for channel in streams["force_torque"].spec.channels] == ["fz"]
-    plan = named(meta.plan)
-    for name in ("friction", "skin-vibration"):
-        assert (plan[name].included, plan[name].change) == (False, 0.0)
-    assert plan["ac-pressure"].included
 
 
 def test_a_surface_of_an_earlier_recording_is_read_by_its_wavelength():

@@ -1,15 +1,13 @@
-"""The driver against the emulated sensor: through the bridge's frames on a pseudo-terminal, and in virtual time."""
+"""The driver against the emulated sensor, in virtual time."""
 
 import math
-import os
 from collections import deque
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
-from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin import RigError, UsageError
 from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
@@ -17,16 +15,13 @@ from tactbench.plugin.devices import (
     LinkUnplugged,
     SpiLink,
     SpiReply,
-    open_link,
 )
 from tactbench.sensors.biotac.codec import CHANNELS
 from tactbench.sensors.biotac.driver import BioTacDriver
 from tactbench.sensors.biotac.emulator import BioTacFault, Emulator, build_emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.spec import SPEC
-from tests.links.ends import serving
 
-MISSING, SUSPECT = int(Quality.MISSING), int(Quality.SUSPECT)
 SERIAL = {
     "serial number": "BT-2P-02.2.0-B-11-E-0004",
     "flex version": "B.D",
@@ -328,28 +323,3 @@ def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed(speed_hz, op
         BioTacDriver(DriverSettings(lambda: link, options=options))
     with pytest.raises(LinkError, match="closed"):
         link.receive(0.0)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-def test_a_second_at_full_rate_through_the_bridge():
-    """Every frame that was asked for is there, whole, as it was sensed.
-
-    In real time: a machine too busy for it asks for fewer frames, which is counted and no loss.
-    """
-    sensed = Sensed()
-    with (
-        serving(BridgeEmulator(emulator(sensed).exchange, holds=16)) as far,
-        BioTacDriver(DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams,
-                             {"batches_ahead": 16})) as driver,
-    ):  # fmt: skip
-        assert driver.identify() == {**SERIAL, "adapter": "tactbench emulator"}
-        driver.start()
-        streams = read_frames(driver, 100)
-        counts = driver.counts
-    slow, fast = streams["electrodes"], streams["vibration"]
-    assert set(counts) <= {"batches late", "frames not requested"}
-    rows, unasked = len(slow["sequence"]), counts.get("frames not requested", 0)
-    assert (slow["sequence"][0], slow["sequence"][-1]) == (0, rows - 1 + unasked)
-    assert not any(stream["quality"].any() for stream in streams.values())
-    slow["sequence"], fast["sequence"] = np.arange(rows), np.arange(22 * rows)
-    assert_sensed(streams, sensed.frames())
