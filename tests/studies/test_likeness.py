@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from studies.likeness.__main__ import PAGE, table, written
-from studies.likeness.figures import BIOTAC, ICUB, STATISTICS, States, crossing
+from studies.likeness.figures import BIOTAC, ICUB, STATISTICS
 from studies.likeness.patterns import Trial, compare_plates, explained, predicted
 
 
@@ -45,16 +45,3 @@ def test_the_page_says_what_the_simulation_gives():
     page = PAGE.read_text(encoding="utf-8")
     with threadpool_limits(1):
         assert written(page, {"icub": table("icub", ICUB)}) == page, "python -m studies.likeness --write"
-
-
-def test_the_crossing_is_where_falling_turns_into_rising():
-    angle = np.linspace(0.0, 90.0, 1801)
-    # Linear in the angle: exact up to the fill of the bins.
-    assert crossing(angle, angle - 37.0) == pytest.approx(37.0, abs=0.1)
-    assert np.isnan(crossing(angle, angle + 1.0))
-
-
-def test_states_are_those_within_a_band_of_pressure():
-    states = States(("a", "b"), change=np.array([[1.0, -9.0], [50.0, 7.0]]), pressure=np.array([10.0, 300.0]))
-    figure = next(one for one in BIOTAC if one.statistic == "largest rise" and one.band == (200.0, 350.0))
-    assert STATISTICS["largest rise"](states.of(figure), figure) == 50.0

@@ -68,7 +68,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = reasons.get(effect.name, Reason(False, NOT_OBSERVED, 0.0))
+        reason = reasons[effect.name]
         taken = signed.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
@@ -149,34 +149,22 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 def _needed(
     effects: Sequence[EffectDescriptor], tokens: set[str], signed: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
-    """Return the reasons of the effects that could be needed, by name.
+    """Return the reasons of all effects, by name.
 
-    Only what is included needs what it consumes: the inputs of an effect that is left out are not
-    included for its sake.
+    Only what is included needs what it consumes: the inputs of an effect that is left out are not included for its
+    sake.
     """
-    begin = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
-    possible = _closure(effects, begin)
-    reasons = {
-        effect.name: _reason(effect, scene, sensor) for effect in effects if possible.intersection(effect.produces)
-    }
-    taking = [effect for effect in effects if effect.name in reasons]
-    taking = [effect for effect in taking if signed.get(effect.name, reasons[effect.name].called_for)]
-    needed = _closure(taking, begin)
+    reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
+    taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
+    needed = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
+    before: set[str] = set()
+    while needed != before:
+        before = needed
+        needed = needed.union(*(effect.consumes for effect in taking if needed.intersection(effect.produces)))
     for effect in taking:
         if not needed.intersection(effect.produces):
             reasons[effect.name] = Reason(False, NOT_OBSERVED, 0.0)
     return reasons
-
-
-def _closure(effects: Sequence[EffectDescriptor], tokens: set[str]) -> set[str]:
-    needed = set(tokens)
-    while True:
-        more = {
-            token for effect in effects if needed.intersection(effect.produces) for token in effect.consumes
-        } - needed
-        if not more:
-            return needed
-        needed |= more
 
 
 def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:

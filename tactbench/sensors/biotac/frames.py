@@ -265,22 +265,12 @@ class FrameBatches(FrameRows):
     def take(
         self, first: int, data: Sequence[bytes], *, t_ns: int, device_ns: int | None = None, skipped: int = 0
     ) -> None:
-        """Take the reply to a batch.
+        """Take the `data` that came in at `t_ns` during the steps of the batch with position `first`.
 
-        Parameters
-        ----------
-        first
-            What :meth:`next` returned with the batch.
-        data
-            What came in during each of its steps.
-        t_ns
-            When it was in the host.
-        device_ns
-            When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
-            without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
-            if no pause was longer than requested.
-        skipped
-            Words that were not requested in their time so far, as whole frames: sequence numbers stay with the time.
+        `device_ns` is the beginning of the batch by the adapter's own counter. With it, rows have this clock's times
+        beside `t_ns`; without it, `t_ns` is taken for the batch's end and rows have the times before it at which they
+        were sampled if no pause was longer than requested. `skipped` words were not requested in their time so far, as
+        whole frames: sequence numbers stay with the time.
         """
         sampled_ns, end_ns = self.timing(first)
         stride = 2 * self._commands

@@ -45,14 +45,7 @@ class Disc(NamedTuple):
 
 
 class RimmedDiscs:
-    """Electrodes and excitations as discs with rims, on one conduction grid.
-
-    Parameters
-    ----------
-    x_mm, s_mm
-        (nx,), (ns,) centres of the cells.
-    electrodes, excitation
-        The discs.
+    """Electrodes and excitations as discs with rims, on the conduction grid of (nx,), (ns,) cell centres.
 
     Raises
     ------

@@ -45,29 +45,16 @@ def faces_between(corners_mm: FloatArray) -> Faces:
 
 
 class FilmSheet:
-    """A film over electrodes on one grid; `resistances` for any thickness.
-
-    Parameters
-    ----------
-    faces
-        Faces between the cells, in the film's metric.
-    contacts
-        Electrodes and excitation on the cells.
-    """
+    """A film over electrodes on one grid, with the faces between its cells; `resistances` for any thickness."""
 
     def __init__(self, faces: Faces, contacts: RimmedDiscs) -> None:
         self._faces, self._contacts = faces, contacts
 
     def resistances(self, film_mm: FloatArray) -> FloatArray:
-        """Return the (n_electrodes, n_electrodes) resistances times sigma under `film_mm`, in 1/mm.
+        """Return the (n_electrodes, n_electrodes) resistances times sigma under a (nx, ns) film, in 1/mm.
 
         Entry (i, j): the potential of electrode i, the excitations grounded, while a unit of current enters at j and
         leaves by the excitations.
-
-        Parameters
-        ----------
-        film_mm
-            (nx, ns) thickness, positive everywhere.
 
         Raises
         ------

@@ -33,12 +33,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     time is not after that of the sample before it is kept out and counted. Several buses in one log are not
     distinguished.
 
-    Parameters
-    ----------
-    path
-        Ends in ``.log``, ``.asc``, ``.blf`` ...
-    options
-        :class:`~tactbench.sensors.icub.options.LogOptions`.
+    Options are those of :class:`~tactbench.sensors.icub.options.LogOptions`.
 
     Raises
     ------

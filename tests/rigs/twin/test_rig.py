@@ -31,17 +31,9 @@ def _scene(name="cap", **more):
 
 
 def _record(sensor, scene, seed=1, rig=TWIN):
-    """Return the recording, and of each of its streams the times, data and quality, blocks joined."""
+    """Return the recording, and of each of its streams the times, data and quality."""
     with rig.open(sensor, scene, seed=seed) as acquisition:
-        blocks = list(acquisition)
-    streams = {}
-    for name in acquisition.samples:
-        parts = [block for block in blocks if block.stream == name]
-        streams[name] = tuple(
-            None if getattr(parts[0], what) is None else np.concatenate([getattr(block, what) for block in parts])
-            for what in ("t_ns", "data", "quality")
-        )
-    return acquisition, streams
+        return acquisition, {block.stream: (block.t_ns, block.data, block.quality) for block in acquisition}
 
 
 def test_a_recording_has_the_shape_it_promises(sensors):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from collections.abc import Callable
@@ -70,22 +71,11 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
         from tactbench.rigs.twin.contact.local import LocalPress
 
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
-    core: Callable[[Medium], Medium] | None = None
+    core = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
-        where = run.lent["core"]
-
-        def core(medium: Medium) -> Medium:
-            made: Medium = load_object(where)(medium, skin)
-            return made
-
-    return Press(
-        medium_of(skin, grid),
-        gap,
-        run.contact,
-        core=core,
-        fluid_pressure=run.fluid_pressure,
-        tolerance=fidelity.newton_tolerance,
-    )
+        core = functools.partial(load_object(run.lent["core"]), skin=skin)
+    tolerance, fluid_pressure = fidelity.newton_tolerance, run.fluid_pressure
+    return Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=fluid_pressure, tolerance=tolerance)
 
 
 def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:

@@ -13,7 +13,7 @@ from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.sensors.biotac.electrodes import ELECTRODES
-from tests.rigs.twin.conftest import EFFECTS, named
+from tests.rigs.twin.conftest import EFFECTS
 
 SEEDS = 400
 PRESS = ForceRamp(samples=20)
@@ -176,12 +176,6 @@ def test_gains_of_units_differ_as_a_whole_and_never_turn_round(sensors):
     # sd 0.1 shared, known to 6.5 % from 120 units; 0.05 each adds 0.0144 to the mean of 12.
     assert gains.mean(axis=1).std() == pytest.approx(np.hypot(0.1, 0.05 / np.sqrt(12)), rel=0.26)
     assert (gains > 0).all()
-
-
-def test_the_plan_includes_rest_levels_of_another_unit_only(sensors):
-    for unit, wanted in (("1", False), ("2", True)):
-        plan = plan_scene(EFFECTS, Scene(name="a", unit=unit), sensors["biotac"].spec)
-        assert named(plan.entries)["unit-rest"].included is wanted
 
 
 def test_creep_shares_the_load_among_now_and_later(sensors):
