@@ -75,7 +75,7 @@ def test_a_table_is_met_at_its_entries_straight_between_and_even_beyond():
 @pytest.mark.parametrize("wrong", [{"x_mm": (1.0, 1.0)}, {"value_mm": ((1.0, math.nan), (1.0, 1.0))}])
 def test_a_table_that_is_none_is_refused(wrong):
     given_ = {"x_mm": (0.0, 1.0), "angle_deg": (0.0, 9.0), "value_mm": ((1.0, 1.0), (1.0, 1.0))}
-    with pytest.raises(ValueError, match=r"ascending axes|finite number"):
+    with pytest.raises(ValueError, match=r"ascending|finite"):
         SheetTable(**{**given_, **wrong}, source=relief(0.0).source)
 
 

@@ -113,9 +113,9 @@ def test_lines_that_are_no_sample_are_counted(log_of):
 
 
 def test_what_cannot_be_read_is_refused(log_of, tmp_path):
-    with pytest.raises(DataError, match=r"sensor 3; 88"):
+    with pytest.raises(DataError, match="sensor 3"):
         log_of(printed(words(2)), sensor=3)
-    with pytest.raises(DataError, match="sensor 0; 0"):
+    with pytest.raises(DataError, match="sensor 0"):
         log_of([])
     with pytest.raises(DataError, match=r"none\.txt"):
         read_log(tmp_path / "none.txt", {})
