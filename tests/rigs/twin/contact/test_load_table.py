@@ -126,5 +126,5 @@ def test_no_slope_is_steeper_than_the_steepest_and_one_comes_near(gaps, seed, on
     # Rounding of the values over the step between two loads.
     assert np.all(seen <= bound + 1e-13 * np.abs(values).max() / (at[1] - at[0]))
     if low == 0.0 and high == loads[-1]:
-        # Within an interval the power's factor changes by at most 1.6 to 1.
-        assert np.all(bound <= 1.75 * seen + 1e-9)
+        # Within an interval of up to 1 N the power's factor changes by at most 2.14 to 1.
+        assert np.all(bound <= 2.2 * seen + 1e-9)
