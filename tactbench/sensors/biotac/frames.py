@@ -15,7 +15,7 @@ import numpy as np
 
 from tactbench.plugin import Block, Quality, Source, StreamSpec
 from tactbench.plugin.devices import SpiStep
-from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
+from tactbench.sensors.biotac.channels import CONVERTER_TOP, NAMES, STREAMS
 from tactbench.sensors.biotac.codec import (
     COMMAND_RATE,
     INDEX,
@@ -27,7 +27,6 @@ from tactbench.sensors.biotac.codec import (
     decoded,
     sampling_command,
 )
-from tactbench.sensors.biotac.electrodes import NAMES
 
 if TYPE_CHECKING:
     import numpy.typing as npt

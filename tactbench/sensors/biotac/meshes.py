@@ -11,7 +11,7 @@ import math
 
 from tactbench.plugin import Source
 from tactbench.plugin.simulation import SheetTable
-from tactbench.sensors.biotac.electrodes import ELECTRODES
+from tactbench.sensors.biotac.channels import ELECTRODES
 
 MESHES = (
     "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj, x = -12.2 mm - x of the meshes, whose "

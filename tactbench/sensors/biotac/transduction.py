@@ -11,7 +11,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState, Transducer
-from tactbench.sensors.biotac.electrodes import NAMES
+from tactbench.sensors.biotac.channels import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.meshes import sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs

@@ -12,7 +12,7 @@ from tactbench.rigs.twin.effects.channels import gain, offset, rest_spread, smoo
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.sensors.biotac.electrodes import ELECTRODES
+from tactbench.sensors.biotac.channels import ELECTRODES
 from tests.rigs.twin.conftest import EFFECTS
 
 SEEDS = 400
