@@ -21,7 +21,7 @@ from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
+from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
 from tactbench.sensors.icub.spec import SPEC as ICUB
@@ -31,6 +31,20 @@ LOADS_N = np.array([0.1, 0.25, 0.5, 0.8, 1.2, 2.0, 3.0, 4.0, 5.0])
 OFFSETS = ((5.0, 0.07, 0.11), (10.0, -0.08, -0.07), (40.0, -0.03, 0.06), (math.inf, 0.1, 0.1))
 WHITE_COUNT = 0.35
 """White noise of a channel of either sensor."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Grids(Fidelity):
+    """Accuracy settings, and cells per skin cell and axis in the BioTac's conduction."""
+
+    conduction_refinement: int = 2
+
+    def options(self, spec: SensorSpec) -> dict[str, int]:
+        """Return the keywords of a sensor's transducer."""
+        return {"refinement": self.conduction_refinement} if spec is BIOTAC else {}
+
+
+DEFAULT = Grids()
 
 
 def pressed(spec: SensorSpec, contact: Contact, fidelity: Fidelity):
@@ -43,7 +57,7 @@ def pressed(spec: SensorSpec, contact: Contact, fidelity: Fidelity):
     press = Press(medium, gap, contact, core=core, tolerance=fidelity.newton_tolerance)
     factory = load_object(f"tactbench.sensors.{spec.name}.transduction:build")
     names = [channel.name for channel in spec.channels("taxel")]
-    return press, factory(spec, grid, names, **fidelity.options(factory))
+    return press, factory(spec, grid, names, **fidelity.options(spec))
 
 
 def changes(spec: SensorSpec, fidelity: Fidelity, *, table: bool = False) -> FloatArray:

@@ -20,9 +20,9 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 POINTS = {
-    "coarse": {"conduction_refinement": 1, "most_nodes": 9, "table_tolerance_factor": 12.0},
+    "coarse": {"most_nodes": 9, "table_tolerance_factor": 12.0},
     "default": {},
-    "finer": {"conduction_refinement": 3, "cells_factor": 1.5, "most_nodes": 20, "table_tolerance_factor": 3.0},
+    "finer": {"cells_factor": 1.5, "most_nodes": 20, "table_tolerance_factor": 3.0},
 }
 """Fidelity points of the front, coarse to fine."""
 
@@ -76,14 +76,12 @@ def errors() -> dict[tuple[str, str], float]:
     import numpy as np
     import twin_convergence as convergence
 
-    from tactbench.rigs.twin.fidelity import DEFAULT
-
     found = {}
     for spec in (convergence.BIOTAC, convergence.ICUB):
         _, finest = convergence.rows(spec)[-1]
         reference = convergence.changes(spec, finest)
         for point, changed in POINTS.items():
-            change = convergence.changes(spec, dataclasses.replace(DEFAULT, **changed), table=True)
+            change = convergence.changes(spec, dataclasses.replace(convergence.DEFAULT, **changed), table=True)
             found[spec.name, point] = float(np.sqrt(np.mean((change - reference) ** 2) / np.mean(reference**2)))
     return found
 

@@ -4,7 +4,7 @@ Each scene is recorded with the effects chosen, with each effect alone whose bou
 together that are said to change nothing, with all but creep, and with all. The readings before rounding are compared:
 every difference has to keep its bound, of several effects the sum of theirs. Half of the scenes press a BioTac, half an
 iCub fingertip: caps from 2 mm to flat, off the middle and near the edges, half of them tilted by up to 15 degrees, up
-to 12 N, up and down, within a minute to days, with and without heat from an indenter nearly as warm as the core. What
+to 12 N, up and down, within a minute to days, with and without an indenter of its own temperature. What
 the twin refuses is drawn anew.
 
 Exit status 1 if a bound does not hold.

@@ -1,4 +1,4 @@
-"""The estimators tactbench brings: descriptors here, code in the modules they name, reasons in docs/estimators.md."""
+"""The estimators of tactbench: descriptors here, code in the modules they name, reasons in docs/estimators.md."""
 
 from __future__ import annotations
 

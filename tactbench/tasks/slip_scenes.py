@@ -8,15 +8,14 @@ taps, ripples. Every condition is recorded in each of four sessions, two of them
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from types import MappingProxyType
 
 from tactbench.plugin import ForcePath, Indenter, Placement, PlannedScene, Role, Scene, Source, assumed, derived
 from tactbench.plugin.simulation import Environment, Slide, Surface
 
 _CHOICE = "a condition of the slip campaign"
-SESSIONS: Mapping[str, Role] = MappingProxyType(
-    {"train-1": "train", "train-2": "train", "validation": "validation", "test": "test"}
-)
+SESSIONS: Mapping[str, Role] = {
+    "train-1": "train", "train-2": "train", "validation": "validation", "test": "test",
+}  # fmt: skip
 """Sessions of the campaign and their roles."""
 SPEEDS_MM_S = (10.0, 20.0, 50.0)
 FORCES_N = (0.5, 1.5)
@@ -30,7 +29,7 @@ SLIP_S = 4.6
 """Length of a recording with a slip."""
 PATTERN_S = 12.0
 """Duration of a pattern of disturbances; the first begins at 3 s."""
-TIMES: Mapping[Role, int] = MappingProxyType({"train": 1, "validation": 3, "test": 3})
+TIMES: Mapping[Role, int] = {"train": 1, "validation": 3, "test": 3}
 """How many recordings there are of each disturbance, and how many patterns in each: six disturbances, nine times, are
 eleven minutes, in which one false alarm a minute is more than ten alarms."""
 DISTURBED_S = 3.0
@@ -52,12 +51,12 @@ def _surface(static: float, kinetic: float, rms_um: float, roll_off_mm: float) -
     )
 
 
-SURFACES: Mapping[str, Surface] = MappingProxyType({
+SURFACES: Mapping[str, Surface] = {
     "smooth": _surface(0.5, 0.45, 2.0, 0.1),
     "default": Surface(),
     "coarse": _surface(0.6, 0.5, 150.0, 1.0),
     "knit": _surface(0.9, 0.78, 100.0, 2.0),
-})  # fmt: skip
+}
 """Dragged surfaces: a polished one, the twin's default, a coarse one, and a knitted fabric."""
 
 Points = list[tuple[float, float]]
@@ -97,9 +96,7 @@ def ripples(force_n: float, patterns: int) -> Points:
     return points
 
 
-DISTURBANCES: Mapping[str, Callable[[float, int], Points]] = MappingProxyType(
-    {"presses": presses, "taps": taps, "ripples": ripples}
-)
+DISTURBANCES: Mapping[str, Callable[[float, int], Points]] = {"presses": presses, "taps": taps, "ripples": ripples}
 """Patterns of the normal force without slip, by kind."""
 
 

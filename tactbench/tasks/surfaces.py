@@ -9,7 +9,6 @@ scene's default, so that a cap, a placement, a unit or a session differs by itse
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from tactbench.plugin import ForceRamp, Indenter, Placement, PlannedScene, Quantity, Role, Scene, assumed, sourced
 
@@ -35,7 +34,7 @@ FEW = (1, 2, 5, 10)
 
 SHORT = ForceRamp(samples=1000)
 NOMINAL = Placement()
-NOTHING: Mapping[str, str] = MappingProxyType({})
+NOTHING: Mapping[str, str] = {}
 
 
 def indenter(radius_mm: float | None) -> Indenter:

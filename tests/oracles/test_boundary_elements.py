@@ -20,7 +20,7 @@ def distances(cells: int) -> np.ndarray:
 # The bounds are what point collocation reaches on these grids.
 @pytest.mark.parametrize(
     ("cells", "depth", "peak", "radius"),
-    [(64, 1.6e-4, 8.3e-4, 3.4e-4), (128, 4e-5, 2.1e-4, 1.1e-4), (256, 1.2e-5, 5e-5, 2.4e-5)],
+    [(64, 1.6e-4, 8.3e-4, 3.4e-4), (128, 4e-5, 2.1e-4, 1.1e-4)],
 )
 def test_hertz(cells, depth, peak, radius):
     found, a = pressed(SOFT, paraboloid_mm(cells, SIDE), SIDE, 1.0), HERTZ.contact_radius_mm(1.0)
@@ -37,7 +37,7 @@ def test_hertz(cells, depth, peak, radius):
     )
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.499])
+@pytest.mark.parametrize("poisson", [0.499])
 def test_a_layer_against_finite_elements_wide_contact(poisson):
     """Depth 0.5 mm: contact radii of 2.8 to 3.1 mm on a layer of 2 mm."""
     misses = []

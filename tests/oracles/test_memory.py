@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.memory import lag, time_constant_s
+from tactbench.rigs.twin.effects.memory import lag
 
 ROUNDING = 1e-12
 """Relative errors of exact filters: some thousand operations, each off by 1e-16."""
@@ -50,14 +49,3 @@ def test_a_heated_core_under_a_growing_contact_is_of_second_order():
         errors.append(abs(float(CORE.carried(t_s, rate * t_s, indenter_c, start_c)[-1]) - true))
     assert 1.9 <= order(errors) <= 2.1
     assert errors[-1] <= 1e-3  # a tenth of a count of the BioTac's temperature
-
-
-def test_a_low_pass_at_its_cut_off():
-    cutoff = 2.0
-    t_s = np.linspace(0, 6, 60_001)
-    found = lag(t_s, np.sin(2 * math.pi * cutoff * t_s), time_constant_s(cutoff))[30_000:]
-    turn = 2 * math.pi * cutoff * t_s[30_000:]
-    (inside, beside), *_ = np.linalg.lstsq(np.stack([np.sin(turn), np.cos(turn)], axis=1), found, rcond=None)
-    # 1/(1 + i f/f_c) at f = f_c; straight pieces of 1e-4 s cost (w dt)²/12 = 1e-7.
-    assert np.hypot(inside, beside) * math.sqrt(2) == pytest.approx(1.0, abs=1e-6)
-    assert -np.arctan2(beside, inside) / math.pi == pytest.approx(0.25, abs=1e-6)

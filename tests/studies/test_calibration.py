@@ -2,7 +2,6 @@
 
 import sys
 
-import numpy as np
 import pytest
 import yaml
 
@@ -11,8 +10,7 @@ from tests.conftest import ROOT
 sys.path.append(str(ROOT))  # behind everything installed
 
 from studies.calibration.__main__ import DOCUMENT, HERE, RESULTS, calibrate, document
-from studies.calibration.analysis import accept, by_fitted
-from studies.calibration.draws import Draw, parameters_of, read, roughness, write
+from studies.calibration.draws import parameters_of, read, write
 
 PROCEDURE = yaml.safe_load("""
 seed: 3
@@ -51,15 +49,6 @@ def test_draws_and_settings_are_carried_out_written_and_read_back(tmp_path):
     assert (quiet.seed, quiet.outputs["ramp"]) == (first.seed, pytest.approx(0.1, rel=0.1))
 
 
-def test_a_draw_is_the_same_alone_and_with_one_nuisance_more():
-    another = {"name": "since_power_on_s", "prior": {"kind": "log-uniform", "low": 60, "high": 90}}
-    more = {**PROCEDURE, "nuisances": [another, *PROCEDURE["nuisances"]]}
-    seed, values = parameters_of(PROCEDURE, 5)
-    again, others = parameters_of(more, 5)
-    assert (again, {**others, **values}) == (seed, others)
-    assert parameters_of(PROCEDURE, 6)[0] != seed
-
-
 def test_stored_draws_are_those_of_the_stored_procedure():
     procedure, result = yaml.safe_load((HERE / "calibration.yaml").read_text(encoding="utf-8")), read(RESULTS)
     for draw in result.draws[:20]:
@@ -73,18 +62,3 @@ def test_the_page_has_the_tables_of_the_stored_results_and_every_prior():
     text = (HERE / "README.md").read_text(encoding="utf-8")
     priors = [one["prior"] for one in read(RESULTS).procedure["nuisances"]]
     assert [one for one in priors if f"{one['low']:g} to {one['high']:g}" not in text] == []
-
-
-def test_near_draws_are_accepted_and_the_nearest_where_they_are_few():
-    draws = [Draw(number, 0, {}, {"a": float(number)}) for number in range(10)]
-    target = {"output": "a", "value": 4.0, "scale": 0.5, "use": "fitted"}
-    near = accept({"tolerance": 2.0, "at_least": 0}, draws, [target])
-    assert ([draw.number for draw in near.draws], near.near, near.reach) == ([3, 4, 5], 3, 2.0)
-    few = by_fitted({"published": [target], "tolerance": 0.5, "at_least": 5}, draws)
-    assert ([draw.number for draw in few.draws], few.near, few.reach) == ([2, 3, 4, 5, 6], 1, 4.0)
-
-
-def test_roughness_is_the_white_noise_of_predictions_and_of_no_rise():
-    rng, rise = np.random.default_rng(1), np.linspace(0.0, 5.0, 4000)
-    predicted = np.concatenate([rise, 3.0 + rise]) + rng.normal(0, 0.1, 8000)
-    assert roughness(predicted, np.repeat([0, 1], 4000), 41) == pytest.approx(0.1, rel=0.05)

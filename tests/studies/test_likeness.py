@@ -5,24 +5,14 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from studies.likeness.__main__ import PAGE, table, written
-from studies.likeness.figures import BIOTAC, ICUB, STATISTICS, States, crossing
-from studies.likeness.patterns import Trial, compare_plates, correlations, explained, predicted
+from studies.likeness.figures import BIOTAC, ICUB, STATISTICS
+from studies.likeness.patterns import Trial, compare_plates, explained, predicted
 
 
 def test_every_figure_has_a_statistic_and_a_range_around_its_value():
     for figure in (*BIOTAC, *ICUB):
         assert figure.statistic in STATISTICS
         assert figure.low <= figure.typical <= figure.high
-
-
-def test_explained_variance_is_one_of_itself_nothing_of_the_mean_and_less_of_noise():
-    rng = np.random.default_rng(1)
-    real = rng.standard_normal((200, 19))
-    assert explained(real, real) == 1.0
-    assert explained(real, np.tile(real.mean(axis=0), (200, 1))) == pytest.approx(0.0, abs=1e-12)
-    # Half of the variance as noise: 3800 numbers, known to 2 %.
-    assert explained(real, real + np.sqrt(0.5) * rng.standard_normal(real.shape)) == pytest.approx(0.5, abs=0.05)
-    assert correlations(real, 3 * real + 5) == pytest.approx(1.0)
 
 
 # The recordings' third component is positive, where the simulation's is negative: the pad faces -z.
@@ -55,16 +45,3 @@ def test_the_page_says_what_the_simulation_gives():
     page = PAGE.read_text(encoding="utf-8")
     with threadpool_limits(1):
         assert written(page, {"icub": table("icub", ICUB)}) == page, "python -m studies.likeness --write"
-
-
-def test_the_crossing_is_where_falling_turns_into_rising():
-    angle = np.linspace(0.0, 90.0, 1801)
-    # Linear in the angle: exact up to the fill of the bins.
-    assert crossing(angle, angle - 37.0) == pytest.approx(37.0, abs=0.1)
-    assert np.isnan(crossing(angle, angle + 1.0))
-
-
-def test_states_are_those_within_a_band_of_pressure():
-    states = States(("a", "b"), change=np.array([[1.0, -9.0], [50.0, 7.0]]), pressure=np.array([10.0, 300.0]))
-    figure = next(one for one in BIOTAC if one.statistic == "largest rise" and one.band == (200.0, 350.0))
-    assert STATISTICS["largest rise"](states.of(figure), figure) == 50.0

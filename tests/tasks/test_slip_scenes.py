@@ -40,16 +40,6 @@ def test_every_condition_is_recorded_in_every_session():
     assert len(set(moments)) == len(moments)
 
 
-@pytest.mark.parametrize("role", ["train", "validation", "test"])
-def test_a_role_has_slips_and_enough_disturbance(role):
-    mine = [planned.scene for planned in SLIP_SCENES if planned.role == role]
-    disturbed = [scene for scene in mine if scene.labels["event"] == "disturbance"]
-    assert {scene.labels["condition"].split("-")[0] for scene in disturbed} == set(DISTURBANCES)
-    # Ten false alarms are one a minute where a bound is kept or tested; frames begin 0.6 s late.
-    assert sum(scene.profile.duration.to("s") - 0.6 for scene in disturbed) > (60 if role == "train" else 600)
-    assert len(mine) - len(disturbed) >= 24
-
-
 def test_no_clock_tells_when_a_slip_begins():
     starts = np.array([scene.slide.start.to("s") for scene in TESTED if scene.labels["event"] == "slip"])
     # Uniform over a second: a standard deviation of 0.289.
@@ -60,8 +50,7 @@ def test_no_clock_tells_when_a_slip_begins():
     assert all(len(set(found)) == len(found) for found in by_condition.values())
 
 
-@pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_labels_agree_with_what_the_twin_knows(sensor):
+def test_labels_agree_with_what_the_twin_knows():
     """Frames by :func:`slip_labels` against the twin's own state: slipped yet, and its stick ratio.
 
     Where they may differ: the label of gross slip begins 0.1 mm after it (5 of 2300 samples at 10 mm/s), or before the
@@ -73,7 +62,7 @@ def test_labels_agree_with_what_the_twin_knows(sensor):
     scenes = [scene for scene in scenes if scene.name.endswith("-test")]
     assert len(scenes) == 14
     for scene in scenes:
-        acquisition = record(sensor, scene, observe=("taxel",))
+        acquisition = record("biotac", scene, observe=("taxel",))
         t_ns, found = columns(acquisition, "force_torque")
         labels = slip_labels(
             t_ns, found["slip"], found["tangential"], found["normal"], scene.labels["friction_coefficient"], THRESHOLDS

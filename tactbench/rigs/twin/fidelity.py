@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from tactbench.plugin import UsageError
 from tactbench.plugin.simulation import SkinSheet
@@ -20,8 +18,6 @@ class Fidelity:
     """Solver of a load: the minimiser of the whole energy, or each cell by itself."""
     cells_factor: float = 1.0
     """Cells of the skin along each axis, relative to those of the sensor's SkinSheet."""
-    conduction_refinement: int = 2
-    """Cells per cell of the skin and axis in a transducer's own finer grid."""
     newton_tolerance: float = 1e-6
     """Largest relative residual of the contact solver."""
     most_nodes: int = 14
@@ -43,21 +39,10 @@ class Fidelity:
         along, across = (max(4, 2 * round(cells * self.cells_factor / 2)) for cells in sheet.cells)
         return along, across
 
-    def options(self, factory: Callable[..., Any]) -> dict[str, Any]:
-        """Return `refinement` for a transducer's factory that has such an argument; the grid of others gets finer."""
-        accepted = inspect.signature(factory).parameters
-        return {"refinement": self.conduction_refinement} if "refinement" in accepted else {}
-
 
 DEFAULT = Fidelity()
 """Settings of every recording without settings of its own."""
-FINE = Fidelity(
-    cells_factor=3.0,
-    conduction_refinement=2,
-    newton_tolerance=1e-8,
-    most_nodes=64,
-    table_tolerance_factor=0.1,
-)
+FINE = Fidelity(cells_factor=3.0, newton_tolerance=1e-8, most_nodes=64, table_tolerance_factor=0.1)
 """Reference for measuring the error of the others, at a hundred times the cost."""
 
 RUNGS: dict[str, Fidelity] = {

@@ -41,12 +41,7 @@ class Contact:
 def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
     """Return the cell centres of `sheet`, ``x_min + (i + 1/2) dx`` and ``-arc/2 + (j + 1/2) ds``.
 
-    Parameters
-    ----------
-    sheet
-        The rectangle.
-    cells
-        Cells along x and s instead of the sheet's own.
+    `cells` along x and s take the place of the sheet's own.
 
     Raises
     ------

@@ -68,7 +68,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = reasons.get(effect.name, Reason(False, NOT_OBSERVED, 0.0))
+        reason = reasons[effect.name]
         taken = signed.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
@@ -106,7 +106,7 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
         if not meant:
             groups = sorted({group for effect in effects for group in effect.groups} | {"all"})
             raise UsageError(
-                f"No installed effect is called {name!r}, as {word!r} asks.",
+                f"No installed effect is called {name!r}, which {word!r} names.",
                 hint=f"Effects: {', '.join(effect.name for effect in effects)}. Groups: {', '.join(groups)}.",
             )
         for found in meant:
@@ -127,9 +127,9 @@ def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reaso
 
 
 def _entry(effect: EffectDescriptor, reason: Reason, taken: bool, *, asked: bool) -> PlanEntry:
-    text = f"asked for; else: {reason.text}" if asked and taken else reason.text
+    text = f"included as stated; else: {reason.text}" if asked and taken else reason.text
     if asked and not taken:
-        text = f"left out as asked; else: {reason.text}" if reason.called_for else reason.text
+        text = f"left out as stated; else: {reason.text}" if reason.called_for else reason.text
     # An effect that was called for and is left out all the same: what it would have changed is no bound any more.
     change = None if asked and not taken and reason.called_for else reason.change
     return PlanEntry(effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked)
@@ -149,34 +149,22 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 def _needed(
     effects: Sequence[EffectDescriptor], tokens: set[str], signed: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
-    """Return the reasons of the effects that could be needed, by name.
+    """Return the reasons of all effects, by name.
 
-    Only what is included needs what it consumes: the inputs of an effect that is left out are not
-    included for its sake.
+    Only what is included needs what it consumes: the inputs of an effect that is left out are not included for its
+    sake.
     """
-    begin = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
-    possible = _closure(effects, begin)
-    reasons = {
-        effect.name: _reason(effect, scene, sensor) for effect in effects if possible.intersection(effect.produces)
-    }
-    taking = [effect for effect in effects if effect.name in reasons]
-    taking = [effect for effect in taking if signed.get(effect.name, reasons[effect.name].called_for)]
-    needed = _closure(taking, begin)
+    reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
+    taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
+    needed = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
+    before: set[str] = set()
+    while needed != before:
+        before = needed
+        needed = needed.union(*(effect.consumes for effect in taking if needed.intersection(effect.produces)))
     for effect in taking:
         if not needed.intersection(effect.produces):
             reasons[effect.name] = Reason(False, NOT_OBSERVED, 0.0)
     return reasons
-
-
-def _closure(effects: Sequence[EffectDescriptor], tokens: set[str]) -> set[str]:
-    needed = set(tokens)
-    while True:
-        more = {
-            token for effect in effects if needed.intersection(effect.produces) for token in effect.consumes
-        } - needed
-        if not more:
-            return needed
-        needed |= more
 
 
 def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:

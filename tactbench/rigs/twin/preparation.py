@@ -111,7 +111,7 @@ def _load(scene: Scene) -> tuple[FloatArray, Load]:
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
     """Yield the channels on the reference clock, then those of every stream that keeps its own.
 
-    A scene that slides asks when something happened: there, no stream is faster than its sensor samples it.
+    A scene that slides is about moments: there, no stream is faster than its sensor samples it.
     """
     duration = scene.profile.duration.to("s")
     slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
@@ -179,7 +179,7 @@ def check_numbers(scene: Scene) -> None:
     samples = scene.profile.samples
     if samples > MOST_SAMPLES:
         raise RigError(
-            f"Scene {scene.name!r} asks for {samples} samples; up to {MOST_SAMPLES} fit into memory.",
+            f"Scene {scene.name!r} has {samples} samples; up to {MOST_SAMPLES} fit into memory.",
             hint="Record in parts.",
         )
     for name, value, text in _numbers(scene, ()):

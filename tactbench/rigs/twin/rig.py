@@ -7,7 +7,6 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -48,17 +47,6 @@ _ONE_CLOCK = Source(
 )
 
 
-class Samples(NamedTuple):
-    """The samples of one stream of a recording."""
-
-    t_ns: npt.NDArray[np.int64]
-    """(n,) nanoseconds since the first sample."""
-    data: npt.NDArray[np.generic]
-    """(n, channels)"""
-    quality: npt.NDArray[np.uint8] | None
-    """(n, channels); None: all good."""
-
-
 @dataclass(frozen=True)
 class TwinAcquisition:
     """One simulated recording: iterate it for blocks."""
@@ -68,8 +56,8 @@ class TwinAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
-    samples: Mapping[str, Samples] = field(repr=False)
-    """Samples by name of the stream."""
+    samples: Mapping[str, Block] = field(repr=False)
+    """Samples by name of the stream, the sensor's streams first."""
     run: Synthesis = field(repr=False)
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
@@ -81,23 +69,15 @@ class TwinAcquisition:
         return 1e-3 * (depths_mm - depths_mm[0]), forces_n
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield one block of each stream."""
-        for stream in (*self.streams, *self.reference):
-            t_ns, data, quality = self.samples[stream.name]
-            yield Block(stream=stream.name, t_ns=t_ns, data=data, quality=quality)
+        """Return one block of each stream."""
+        return iter(self.samples.values())
 
 
 class Twin:
-    """The simulated rig.
+    """The simulated rig, with all installed shapes of indenters.
 
-    Parameters
-    ----------
-    effects
-        Candidates for every scene; a plan takes from them what the scene calls for.
-    indenters
-        All installed shapes of indenters.
-    named_effects
-        Candidates where the sensor or the scene names them.
+    `effects` are candidates for every scene: a plan takes from them what the scene calls for. `named_effects` are
+    candidates where the sensor or the scene names them.
     """
 
     def __init__(
@@ -117,7 +97,7 @@ class Twin:
         if missing:
             raise NotApplicable(
                 f"{sensor.name} is simulated with the effects {', '.join(sorted(missing))}, which are not installed.",
-                hint="Install the package that brings them.",
+                hint="Install the package that has them.",
             )
         return found
 
@@ -177,7 +157,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     profile = run.scene.profile
     rate = profile.samples / profile.duration.to("s")
     streams: list[StreamSpec] = []
-    samples: dict[str, Samples] = {}
+    blocks: list[Block] = []
     for track in run.tracks:
         columns = {channel.name: column for column, channel in enumerate(track.channels)}
         for stream in run.sensor.spec.streams:
@@ -188,7 +168,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             clock = {} if track.clock else {"rate_hz": rate, "rate_source": _ONE_CLOCK}
             streams.append(stream.model_copy(update={"channels": kept, **clock}))
             stored = _stored(track.readings[:, own], stream, kept)
-            samples[stream.name] = Samples(_ns(track.t_s), stored, track.quality[:, own])
+            blocks.append(Block(stream.name, _ns(track.t_s), stored, track.quality[:, own]))
     more = {**run.reference_more, **_along_the_slide(run)}
     reference = StreamSpec(
         name=REFERENCE_STREAM,
@@ -197,11 +177,11 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1), *(channel for channel, _ in more.values())),
     )
     measured = np.column_stack([run.reference_n, *(values for _, values in more.values())])
-    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
+    blocks.append(Block(REFERENCE_STREAM, _ns(run.t_s), measured))
     places: tuple[StreamSpec, ...] = ()
     if "position" in run.scene.observe:
         place, values, quality = _contact_point(run, rate)
-        samples[place.name] = Samples(_ns(run.t_s), values, quality)
+        blocks.append(Block(place.name, _ns(run.t_s), values, quality))
         places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     shape = run.contact.shape
@@ -218,7 +198,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             **_simulated_as(run.scene),
         },
         drawn=dict(run.drawn),
-        samples=samples,
+        samples={block.stream: block for block in blocks},
         run=run,
     )
 

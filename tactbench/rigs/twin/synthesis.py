@@ -15,7 +15,6 @@ from tactbench.plugin import (
     ChannelKind,
     ChannelSpec,
     FloatArray,
-    NotApplicable,
     Scalar,
     Scene,
     SensorDescriptor,
@@ -69,7 +68,7 @@ class Tangential(NamedTuple):
     slip_mm: FloatArray
     """Distance that the surface has slipped over the skin."""
     slipping: npt.NDArray[np.bool_]
-    """Whether the whole contact slips."""
+    """True while the whole contact slips."""
     stick_ratio: FloatArray
     """Radius of the part that sticks over that of the contact, 0 to 1."""
 
@@ -142,9 +141,9 @@ class Synthesis:
     reference_n: FloatArray
     """(n,) reading of the force sensor; starts at the true force."""
     fluid_pressure: bool = False
-    """Whether the pressure of the fluid is observed."""
+    """True if the pressure of the fluid is observed."""
     tangential: bool = False
-    """Whether the tangential state of the skin is observed."""
+    """True if the tangential state of the skin is observed."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
@@ -156,7 +155,7 @@ class Synthesis:
     forced: frozenset[str] = frozenset()
     """Effects that the scene includes by name: they are applied whatever the solution of the contact."""
     fidelity: Fidelity = DEFAULT
-    """How finely the contact is resolved."""
+    """Resolution of the contact."""
     rung: str = ""
     """Name of the rung that was chosen to keep a tolerance."""
     rung_error: float | None = None
@@ -184,15 +183,8 @@ class Synthesis:
 
     @property
     def skin(self) -> Skin:
-        """The sensor's skin.
-
-        Raises
-        ------
-        NotApplicable
-            If the sensor declares none.
-        """
-        if self.sensor.spec.skin is None:
-            raise NotApplicable(f"{self.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
+        """The sensor's skin; without one no scene is planned."""
+        assert self.sensor.spec.skin is not None
         return self.sensor.spec.skin
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
@@ -209,7 +201,7 @@ class Synthesis:
         return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator of properties of this recording alone."""
+        """Return the generator of properties of this recording."""
         return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:

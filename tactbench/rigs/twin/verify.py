@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, PlanEntry, Scene, SensorDescriptor, assumed, load_registry
+from tactbench.plugin import FloatArray, PlanEntry, Quantity, Scene, SensorDescriptor, assumed, load_registry
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, SkinState, Verdict, rig_context
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of, press_of
@@ -45,10 +45,8 @@ def verdicts() -> Iterator[Verdict]:
 def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
     """Return the change [count] by the effects left out of `scene`, and the bound on it by the plan.
 
-    Returns
-    -------
-    largest difference of any observed reading, before it is rounded, between a run with every effect and one with the
-    plan's; the sum of the bounds that the plan states.
+    The change is the largest difference of any observed reading, before it is rounded, between a run with every effect
+    and one with the plan's; the bound is the sum of those that the plan states.
     """
     every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
     simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})
@@ -90,14 +88,16 @@ def _pressed(
     poisson: float, thickness_mm: float, side_mm: float, cells: int, penalty: float, force_n: float
 ) -> SkinState:
     """Return the state of a bonded layer, E = 1 MPa, under a paraboloid; its depth is counted from the apex."""
-    why = "an exercise"
-    half, arc = assumed(side_mm / 2, "mm", why), assumed(side_mm, "mm", why)
+
+    def given(value: float, unit: str = "mm") -> Quantity:
+        return assumed(value, unit, "an exercise")
+
     skin = BondedLayer(
-        sheet=SkinSheet(x_min=assumed(-side_mm / 2, "mm", why), x_max=half, arc=arc, cells=(cells, cells)),
-        young=assumed(1.0, "MPa", why),
-        poisson=assumed(poisson, "1", why),
-        thickness=assumed(thickness_mm, "mm", why),
-        contact_stiffness=assumed(penalty, "MPa/mm", why),
+        sheet=SkinSheet(x_min=given(-side_mm / 2), x_max=given(side_mm / 2), arc=given(side_mm), cells=(cells, cells)),
+        young=given(1.0, "MPa"),
+        poisson=given(poisson, "1"),
+        thickness=given(thickness_mm),
+        contact_stiffness=given(penalty, "MPa/mm"),
     )
     grid = skin_grid(skin.sheet)
     gap = (grid.x_mm[:, None] ** 2 + grid.s_mm[None, :] ** 2) / (2 * RADIUS_MM)

@@ -89,9 +89,6 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
             aim = DEFAULT.table_tolerance_factor if nodes <= DEFAULT.most_nodes else 1 / 3
             finer = dataclasses.replace(DEFAULT, cells_factor=factor, table_tolerance_factor=aim)
             yield named("newton", dataclasses.replace(finer, most_nodes=nodes))
-    if isinstance(skin, FluidBackedShell):
-        for refinement in (1, 3):
-            yield named(f"film x{refinement}", dataclasses.replace(DEFAULT, conduction_refinement=refinement))
 
 
 def _rung(fidelity: Fidelity) -> str:
@@ -128,7 +125,6 @@ def _measured(
         "family": family,
         "cells_factor": fidelity.cells_factor,
         "nodes": fidelity.most_nodes,
-        "conduction_refinement": fidelity.conduction_refinement,
     }
     found = []
     for kind in dict.fromkeys(kinds[name] for name in names):

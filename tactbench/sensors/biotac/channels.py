@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
-from tactbench.plugin import ChannelSpec, PhysicalRange, Quantity, Source, StreamSpec, derived, measured, sourced
-from tactbench.sensors.biotac.electrodes import ELECTRODES, NAMES, TABLE, Electrode
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    PhysicalRange,
+    Quantity,
+    Source,
+    StreamSpec,
+    derived,
+    measured,
+    sourced,
+)
 
 PAPER = "Karl et al. 2016, table I"
 MANUAL = "SynTouch BioTac SP product manual (26 Oct 2015), section 5, said to hold for the BioTac's electronics"
@@ -16,6 +26,61 @@ FRAME = Source(
 )
 CONVERTER_TOP = 4095.0
 """12-bit converter; source: kth-ros-pkg/biotac_driver."""
+
+# One table of electrodes is in TAMS-Group/biotac_gazebo_plugin (``sim_biotac.h``) and clear-nus/biotac_driver
+# (``biotac_logger_v3.py``): millimetres, x towards the tip, -z towards the pad, outward normals.
+TABLE = Source(
+    tag="sourced",
+    reference="TAMS-Group/biotac_gazebo_plugin sim_biotac.h, identical in clear-nus/biotac_driver "
+    "biotac_logger_v3.py; normals printed there with three decimals, made exactly unit here",
+)
+
+
+class Electrode(NamedTuple):
+    """One electrode; millimetres."""
+
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    normal: tuple[float, float, float]
+
+
+_SIDE = (0.0, -0.976, -0.220)
+_LOWER = (0.0, -0.692, -0.722)
+_FACET = (0.5, 0.0, -0.866)
+_MIDLINE = (0.0, 0.0, -1.0)
+
+# Electrodes 1-6; 11-16 are their mirror images in y.
+_FLANK = (
+    Electrode(0.993, -4.855, -1.116, (0.196, -0.956, -0.220)),
+    Electrode(-2.700, -3.513, -3.670, _LOWER),
+    Electrode(-6.200, -3.513, -3.670, _LOWER),
+    Electrode(-8.000, -4.956, -1.116, _SIDE),
+    Electrode(-10.500, -3.513, -3.670, _LOWER),
+    Electrode(-13.400, -4.956, -1.116, _SIDE),
+)
+
+
+def _mirrored(electrode: Electrode) -> Electrode:
+    x, y, z = electrode.normal
+    return Electrode(electrode.x_mm, -electrode.y_mm, electrode.z_mm, (x, -y, z))
+
+
+ELECTRODES: tuple[Electrode, ...] = (
+    *_FLANK,
+    Electrode(4.763, 0.000, -2.330, _FACET),
+    Electrode(3.031, -1.950, -3.330, _FACET),
+    Electrode(3.031, 1.950, -3.330, _FACET),
+    Electrode(1.299, 0.000, -4.330, _FACET),
+    *(_mirrored(electrode) for electrode in _FLANK),
+    Electrode(-2.800, 0.000, -5.080, _MIDLINE),
+    Electrode(-9.800, 0.000, -5.080, _MIDLINE),
+    Electrode(-13.600, 0.000, -5.080, _MIDLINE),
+)
+"""Electrodes 1 to 19, in order."""
+
+NAMES: tuple[str, ...] = tuple(f"E{number}" for number in range(1, len(ELECTRODES) + 1))
+"""Their channels' names, in the same order."""
 
 REST_COUNTS: tuple[float, ...] = (
     2796.2, 3356.0, 3374.1, 2974.3, 3329.6, 2849.4, 3086.9, 3153.5, 3153.5, 3236.7,
@@ -44,13 +109,15 @@ def _unit(normal: tuple[float, float, float]) -> tuple[float, float, float]:
     return (x / length, y / length, z / length)
 
 
+def _converted(name: str, kind: ChannelKind, rest: Quantity, **more: Any) -> ChannelSpec:
+    return ChannelSpec(name=name, kind=kind, lower=0.0, upper=CONVERTER_TOP, rest=rest, **more)
+
+
 def _electrode(name: str, place: Electrode, rest: float) -> ChannelSpec:
-    return ChannelSpec(
-        name=name,
-        kind="taxel",
-        lower=0.0,
-        upper=CONVERTER_TOP,
-        rest=derived(rest, "count", _REST_FROM),
+    return _converted(
+        name,
+        "taxel",
+        derived(rest, "count", _REST_FROM),
         # Falls under the contact, where the film thins; rises elsewhere, where the fluid goes.
         sign=0,
         position_m=(place.x_mm * 1e-3, place.y_mm * 1e-3, place.z_mm * 1e-3),
@@ -62,25 +129,7 @@ def _electrode(name: str, place: Electrode, rest: float) -> ChannelSpec:
     )
 
 
-def _converter(
-    name: str,
-    kind: str,
-    rest: Quantity,
-    *,
-    sign: int = 0,
-    scale: Quantity | None = None,
-    measures: PhysicalRange | None = None,
-    band: PhysicalRange | None = None,
-) -> ChannelSpec:
-    return ChannelSpec.model_validate(
-        {
-            "name": name, "kind": kind, "lower": 0.0, "upper": CONVERTER_TOP,
-            "rest": rest, "sign": sign, "scale": scale, "measures": measures, "band": band,
-        }
-    )  # fmt: skip
-
-
-_PDC = _converter(
+_PDC = _converted(
     "PDC",
     "dc_pressure",
     measured(2500.0, "count", "2404-2460 on one BioTac, 2583-2593 on two BioTac SP"),
@@ -90,7 +139,7 @@ _PDC = _converter(
     band=_stated(0.0, 1040.0, "Hz", MANUAL),
 )
 # Counts rise with temperature, not with load: 4025 / ln((155183 - 46555 x)/x) - 273.15 degC with x = TDC/4095.
-_TDC = _converter(
+_TDC = _converted(
     "TDC",
     "dc_temperature",
     measured(2576.0, "count", "2559-2592 on BioTac SP, about 57 degC: the core is heated"),
@@ -98,13 +147,13 @@ _TDC = _converter(
     band=_stated(0.0, 22.6, "Hz", MANUAL),
 )
 # No physical range: the maker's formula gives -3 degC/s at mid-scale, outside its own 0-1 degC/s.
-_TAC = _converter(
+_TAC = _converted(
     "TAC",
     "ac_temperature",
     measured(2037.0, "count", "2032-2042 on BioTac SP"),
     band=_stated(0.45, 22.6, "Hz", f"{PAPER}; {MANUAL} has 0.45 Hz in its table and 0.25 Hz in its text"),
 )
-_PAC = _converter(
+_PAC = _converted(
     "PAC",
     "ac_pressure",
     measured(2043.0, "count", "2040-2045 on BioTac SP"),

@@ -1,9 +1,8 @@
 """The BioTac's words on SPI: commands, replies and properties to bytes and back.
 
-Nothing here reads, writes or waits. Two public sources state the protocol and agree where not said otherwise: [driver]
-kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
-the SynTouch BioTac SP product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Tested
-against an emulator written from the same sources; it has never met a real sensor.
+Two public sources state the protocol and agree where not stated otherwise: [driver] kth-ros-pkg/biotac_driver,
+``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual] the SynTouch BioTac SP
+product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Never tested with a real sensor.
 
 SPI mode 0, most significant bit first, select active low, 500 kHz to 10 MHz [sourced: both]. The host sends a command
 of two bytes, deselects for 50 us, selects again and clocks the reply out. Every byte but a property's is seven bits and
@@ -66,25 +65,18 @@ ERRORS: dict[int, str] = {
 """Second byte of an error reply [sourced: driver; the manual has 2D, 58 and 52]."""
 
 
-class Property(NamedTuple):
-    """A property that can be read: its code and how many bytes the sensor sends."""
-
-    code: int
-    length: int
-
-
-PROPERTIES: dict[str, Property] = {
-    "flex version": Property(0x10, 2),
-    "software version": Property(0x13, 4),
-    "serial number": Property(0x15, 16),
-    "cpu speed": Property(0x61, 2),
-    "sampling frequency": Property(0x70, 2),
+PROPERTIES: dict[str, tuple[int, int]] = {
+    "flex version": (0x10, 2),
+    "software version": (0x13, 4),
+    "serial number": (0x15, 16),
+    "cpu speed": (0x61, 2),
+    "sampling frequency": (0x70, 2),
 }
-"""All are read-only and sent without parity [sourced: manual, table 10; driver]."""
+"""Code and number of bytes; all are read-only and sent without parity [sourced: manual, table 10; driver]."""
 
 
 class Fault(StrEnum):
-    """What can be wrong with one reply."""
+    """Faults of one reply."""
 
     PARITY = "parity"
     RESERVED = "reserved bits"
@@ -129,19 +121,11 @@ def sampling_command(index: int) -> bytes:
 
 def property_command(name: str) -> bytes:
     """Return the two bytes that read property `name`; raises KeyError for a name not in :data:`PROPERTIES`."""
-    return bytes([READ, PROPERTIES[name].code])
+    return bytes([READ, PROPERTIES[name][0]])
 
 
 def encoded(count: int) -> bytes:
-    """Return the reply that carries `count`: ``D11..D5 P``, ``D4..D0 0 0 P`` [sourced: driver; manual, figure 15].
-
-    Raises
-    ------
-    ValueError
-        Outside 0 to 4095.
-    """
-    if not 0 <= count <= 4095:
-        raise ValueError(f"{count} has no word of 12 bits")
+    """Return the reply that carries `count`: ``D11..D5 P``, ``D4..D0 0 0 P`` [sourced: driver; manual, figure 15]."""
     return bytes([with_parity(count >> 5), with_parity((count & 31) << 2)])
 
 
@@ -165,20 +149,13 @@ def decoded(word: bytes) -> Reply:
 
 
 def property_text(name: str, raw: bytes) -> str | None:
-    """Return a property as the maker's tools show it; None if `raw` is none, as from a sensor that is not there.
+    """Return flex version, software version or serial number as the maker's tools show it.
 
-    Parameters
-    ----------
-    name
-        Flex version, software version or serial number.
-    raw
-        The bytes that were clocked out; what follows the property's length is not looked at.
+    None if the bytes clocked out are none, as from a sensor that is not there; those after its length do not count.
     """
-    length = PROPERTIES[name].length
+    _, length = PROPERTIES[name]
     raw = raw[:length]
-    if len(raw) < length:
-        return None
-    if not all(0x21 <= byte <= 0x7E for byte in raw):
+    if len(raw) < length or not all(0x21 <= byte <= 0x7E for byte in raw):
         return None
     text = raw.decode("ascii")
     if name == "flex version":

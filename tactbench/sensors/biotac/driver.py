@@ -1,42 +1,37 @@
 """Driver of the BioTac: batches of SPI transfers in, blocks of counts out.
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
-every byte, so something must keep the time of 4400 words a second. That is an SPI bridge (``spi://bridge/…``, a
-microcontroller that carries out batches by itself, ``docs/links.md``) or, less well, the machine's own SPI
-(``spi://spidev/…``), where the process waits out the pauses itself and another process may lengthen them.
+every byte. An SPI bridge (``spi://bridge/…``, a microcontroller that carries out batches by itself, ``docs/links.md``)
+keeps the time of 4400 words a second; the machine's own SPI (``spi://spidev/…``) does so less well.
 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
-4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`); an adapter adds
-what it needs itself. Some batches are under way ahead of the one that runs, so that the host may be late by as many
-frames. Words are asked for once: what a batch does cannot depend on what it reads (the option `resends` asks for each
-word again, always).
+4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`). Some batches are
+under way ahead of the one that runs, so that the host may be late by as many frames.
 
 **Times.** A bridge stamps each batch with its own microseconds: `device_ns` of a row is that stamp, counted on over its
 wraps, and the word's place in the batch; `t_ns` is when the reply was in the host, the same for all rows of a batch.
-Without such a counter there is `t_ns` alone, counted back from the end of the batch.
+Without such a counter there is only `t_ns`, counted back from the end of the batch.
 
-**What goes wrong, and what a recording then has.** Names in brackets are those of :attr:`BioTacDriver.counts`.
+**Faults.** Names in brackets are those of :attr:`BioTacDriver.counts`; rows are raw counts, and a gap is never filled.
 
 =====================================  =================================================================================
-what                                   in the recording
+fault                                  in the recording
 =====================================  =================================================================================
 a bit turned on the line               SUSPECT, the number as it came [parity E7]; two turned bits of a byte may pass
 both parities good, a fixed bit not    SUSPECT [reserved bits E7]
-the sensor answers with an error       MISSING [error reply E7]
+an error reply                         MISSING [error reply E7]
 the line idle, one word or for long    MISSING [not connected E7]; sensor or select line is not there
-the word before once more              not seen: its bytes are good, so it is taken for this channel's
-a channel that stays where it is       not seen by the driver
+the word before once more, or a        not seen: its bytes are good
+channel that stays where it is
 the reply to a batch lost or damaged   its rows are absent: a gap in the sequence [batches lost]
 the host too late for the next batch   its rows come later [batches late]; whole frames that had their time in the pause
-                                       are a gap in the sequence [frames not asked for]
+                                       are a gap in the sequence [frames not requested]
 cable, port or bridge gone             the reading ends with LinkUnplugged
 =====================================  =================================================================================
 
-A gap is never filled. Rows are raw counts.
-
-**Tested** against an emulator written from the same public sources, behind an emulated bridge. It has never met a real
-BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command, that
-a property is read with the pause of a sampling command, and that a resend needs the same pause.
+**Tested** against an emulator written from the same public sources, never with a real BioTac, bridge or spidev. Assumed
+is above all that the sensor samples at the last bit of its command, that a property is read with the pause of a
+sampling command, and that a resend needs the same pause.
 """
 
 from __future__ import annotations
@@ -144,10 +139,10 @@ class BioTacDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when asked for again.
+        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when requested again.
 
         Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
-        the batch before) and ``frames not asked for`` (that would have had their time in between).
+        the batch before) and ``frames not requested`` (that would have had their time in between).
         """
         return dict(self._counts + self._batches.counts)
 
@@ -162,7 +157,9 @@ class BioTacDriver(Driver):
             If the adapter does not answer.
         """
         if self._running:
-            raise RigError("A BioTac that samples was asked who it is.", hint="Ask before start, or after stop.")
+            raise RigError(
+                "A BioTac cannot be identified while it samples.", hint="Identify it before start, or after stop."
+            )
         self._property("software version")  # thrown away, as the maker's library does
         found = {}
         for name in ("serial number", "flex version", "software version"):
@@ -181,7 +178,7 @@ class BioTacDriver(Driver):
 
     def _property(self, name: str) -> bytes:
         select, pauses = self._options.select, (round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us")))
-        data = (property_command(name), bytes(PROPERTIES[name].length))
+        data = (property_command(name), bytes(PROPERTIES[name][1]))
         number = self._link.send([SpiStep(part, select, pause) for part, pause in zip(data, pauses, strict=True)])
         while True:
             reply = self._link.receive(PATIENCE_S)
@@ -249,7 +246,7 @@ class BioTacDriver(Driver):
             self._counts["batches lost"] += 1
 
     def _begun_us(self, counter_us: int, first: int) -> int:
-        """Return when a batch began by the adapter's counter, counted on; note what was not asked for before it."""
+        """Return when a batch began by the adapter's counter, counted on; count frames not requested before it."""
         if self._last is None:
             begun_us = counter_us
         else:
@@ -260,7 +257,7 @@ class BioTacDriver(Driver):
             if late_us > word_us:
                 frames = round(late_us / (len(self._batches.frame) * word_us))
                 self._counts["batches late"] += 1
-                self._counts["frames not asked for"] += frames
+                self._counts["frames not requested"] += frames
                 self._skipped += frames * len(self._batches.frame)
         self._last = (first, begun_us)
         return begun_us

@@ -113,19 +113,10 @@ class Emulator(SpiDeviceEmulator):
     A sampling command samples at its last bit; the word is read after the pause. Several sensors that are selected
     together are several emulators that get the same bytes.
 
-    Parameters
-    ----------
-    senses
-        Second -> counts of the channels, rounded, and clipped to 0-4095; those left out are at rest. The sensor has E1
-        to E19, PDC, TDC, TAC and PAC, and what else is given: E20 to E24 on an SP. None: all at rest.
-    properties
-        Bytes of each property; one that is left out is unknown to the sensor.
-    faults
-        Faults of the sensor; the list may be changed at any time.
-    select
-        Mask of its select lines, which must all be active for it to receive.
-    clock_hz
-        Clock of the bus, Hz, which determines the duration of a byte.
+    `senses` maps a second to counts of the channels, rounded and clipped to 0-4095; those left out are at rest (None:
+    all). The sensor has E1 to E19, PDC, TDC, TAC and PAC, and what else is given: E20 to E24 on an SP. A property that
+    is left out is unknown to it. All lines of the mask `select` must be active for it to receive. `clock_hz` is that of
+    the bus, and determines the duration of a byte. `faults` may be changed at any time.
     """
 
     def __init__(
@@ -138,7 +129,7 @@ class Emulator(SpiDeviceEmulator):
         clock_hz: float | None = None,
     ) -> None:
         self._senses = senses or (lambda _: {})
-        self._properties = {PROPERTIES[name].code: data for name, data in properties.items()}
+        self._properties = {PROPERTIES[name][0]: data for name, data in properties.items()}
         self.faults = list(faults)
         self._select = select
         self._byte_s = 8.0 / (CLOCK.to("Hz") if clock_hz is None else clock_hz)
@@ -149,22 +140,11 @@ class Emulator(SpiDeviceEmulator):
         self._held: dict[tuple[BioTacFault, str], int] = {}
 
     def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
-        """Return the bytes that the host receives while it sends `data`.
+        """Return the bytes that the host receives while it sends `data` in one period of the `select` lines.
 
-        Parameters
-        ----------
-        select
-            Mask of the lines that are active meanwhile.
-        data
-            One period of the select: two bytes of a command, or fillers (first byte 00 or 01) while a reply is read.
-            Bytes after a command in the same period are read at once, without the pause.
-        now_s
-            When the period begins.
-
-        Returns
-        -------
-        bytes
-            During a command, and while it is not selected, the line is idle [assumed].
+        `data` is two bytes of a command, or fillers (first byte 00 or 01) while a reply is read; bytes after a command
+        are read at once, without the pause. During a command, and while the sensor is not selected, the line is idle
+        [assumed].
         """
         if any(fault.name == "not-connected" and fault.active(now_s) for fault in self.faults):
             self._answer, self._last = None, None

@@ -40,20 +40,9 @@ def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> Flo
     """Return the matrix that takes n cell-centred samples to `cells` cells on the same length.
 
     It is the Dirichlet kernel, that is a zero-padded Fourier transform with the shift between the cells' centres
-    (which do not coincide), written as a matrix: two small products do both axes.
-
-    Parameters
-    ----------
-    n
-        Number of samples, even.
-    cells
-        Number of cells wanted.
-    mirrored
-        The samples go on as their own image at both ends; otherwise they are periodic.
-
-    Returns
-    -------
-    (cells, n); rows sum to 1; exact for every wave below the Nyquist one.
+    (which do not coincide), written as a (cells, n) matrix for an even n: two small products do both axes. Rows sum to
+    1; it is exact for every wave below the Nyquist one. `mirrored` samples go on as their own image at both ends,
+    others are periodic.
     """
     fine = (np.arange(cells) + 0.5) * (n / cells)
     coarse = np.arange(n) + 0.5
@@ -67,16 +56,10 @@ def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> Flo
 def mid_film_mm(
     x_mm: FloatArray, angle_rad: FloatArray, film_mm: FloatArray, outer_mm: float, dome_mm: float
 ) -> FloatArray:
-    """Return the (nx, ns, 3) places of the film's middle.
+    """Return the (nx, ns, 3) places of the film's middle, for a (nx, ns) thickness.
 
-    Parameters
-    ----------
-    x_mm, angle_rad
-        (nx,), (ns,) sheet's axial coordinates and angles around the finger, within a right angle of the midline.
-    film_mm
-        (nx, ns) thickness.
-    outer_mm, dome_mm
-        Radius of the finger's outer surface, and where its dome begins.
+    `x_mm` (nx,) and `angle_rad` (ns,) are the sheet's axial coordinates and angles around the finger, within a right
+    angle of the midline; `outer_mm` is the radius of its outer surface, whose dome begins at `dome_mm`.
     """
     x = x_mm[:, None]
     behind = np.minimum(x, RAYS_FROM_MM)

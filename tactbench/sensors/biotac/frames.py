@@ -1,6 +1,6 @@
 """Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
 
-No input or output, no clock of its own: whoever drives the bus asks for the next batch, sends it, and hands back what
+No input or output, no clock of its own: the driver of the bus takes the next batch, sends it, and returns what
 was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
 """
 
@@ -15,9 +15,8 @@ import numpy as np
 
 from tactbench.plugin import Block, Quality, Source, StreamSpec
 from tactbench.plugin.devices import SpiStep
-from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
+from tactbench.sensors.biotac.channels import CONVERTER_TOP, NAMES, STREAMS
 from tactbench.sensors.biotac.codec import (
-    CHANNELS,
     COMMAND_RATE,
     INDEX,
     RESEND,
@@ -28,7 +27,6 @@ from tactbench.sensors.biotac.codec import (
     decoded,
     sampling_command,
 )
-from tactbench.sensors.biotac.electrodes import NAMES
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -58,14 +56,7 @@ def quality_of(reply: Reply) -> Quality:
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
     """Return the spec's streams as a frame fills them: with its channels only, at its rates.
 
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-    rate_hz
-        Commands a second; None: nobody states it.
-    source
-        Where the rates are from, if they are not the spec's.
+    `rate_hz` is of commands (None: not stated), `source` that of rates that are not the spec's.
     """
     found = []
     for stream in STREAMS:
@@ -95,23 +86,10 @@ class FrameRows:
 
     The k-th word of a channel within a frame belongs to the k-th of that stream's rows. A row ends when all of its
     words are there or a word of another row comes; words that did not come are MISSING. A row of which no word came is
-    absent: a gap in the sequence numbers.
-
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-
-    Raises
-    ------
-    ValueError
-        If a name is none of the sensor's channels, or there is none.
+    absent: a gap in the sequence numbers. A frame is the names of channels in the order of their commands.
     """
 
     def __init__(self, frame: tuple[str, ...]) -> None:
-        unknown = [name for name in frame if name not in CHANNELS]
-        if unknown or not frame:
-            raise ValueError(f"a frame is of one or more of {', '.join(CHANNELS)}; got {', '.join(unknown) or 'none'}")
         self.frame = frame
         self._streams = streams_of(frame, None)
         columns = {
@@ -133,19 +111,10 @@ class FrameRows:
     def put(
         self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None
     ) -> None:
-        """Add one word.
+        """Add the word of the command number `position`, counted over all frames; `count` has no meaning if MISSING.
 
-        Parameters
-        ----------
-        position
-            Number of its command since the first of all, frame after frame.
-        count
-            The datum; of no meaning if MISSING.
-        quality
-            What is wrong with it.
-        t_ns, device_ns
-            Its times, nanoseconds of the host's clock and of the adapter's, if they are known. A row has the times of
-            its first word.
+        Its times are nanoseconds of the host's clock and of the adapter's, where known; a row has those of its first
+        word.
         """
         frame, place = divmod(position, len(self.frame))
         k, column, nth = self._places[place]
@@ -220,18 +189,8 @@ class FrameBatches(FrameRows):
     The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
     repeats the word before it cannot be recognised by its bytes.
 
-    Parameters
-    ----------
-    frame
-        Names of channels in the order of their commands.
-    speed_hz
-        Clock of the SPI bus, hertz.
-    select
-        Mask of the sensor's select lines.
-    resends
-        How often each word is requested again.
-    words
-        Words in a batch; None: a frame of them.
+    `speed_hz` is the clock of the SPI bus, `select` the mask of the sensor's select lines, `words` those in a batch
+    (None: a frame).
 
     Attributes
     ----------
@@ -242,7 +201,7 @@ class FrameBatches(FrameRows):
     Raises
     ------
     ValueError
-        For a frame that is none, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
+        If `speed_hz` leaves no time for the words.
     """
 
     def __init__(
@@ -305,22 +264,12 @@ class FrameBatches(FrameRows):
     def take(
         self, first: int, data: Sequence[bytes], *, t_ns: int, device_ns: int | None = None, skipped: int = 0
     ) -> None:
-        """Take the reply to a batch.
+        """Take the `data` that came in at `t_ns` during the steps of the batch with position `first`.
 
-        Parameters
-        ----------
-        first
-            What :meth:`next` returned with the batch.
-        data
-            What came in during each of its steps.
-        t_ns
-            When it was in the host.
-        device_ns
-            When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
-            without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
-            if no pause was longer than asked for.
-        skipped
-            Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
+        `device_ns` is the beginning of the batch by the adapter's own counter. With it, rows have this clock's times
+        beside `t_ns`; without it, `t_ns` is taken for the batch's end and rows have the times before it at which they
+        were sampled if no pause was longer than requested. `skipped` words were not requested in their time so far, as
+        whole frames: sequence numbers stay with the time.
         """
         sampled_ns, end_ns = self.timing(first)
         stride = 2 * self._commands

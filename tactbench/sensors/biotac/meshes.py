@@ -11,7 +11,7 @@ import math
 
 from tactbench.plugin import Source
 from tactbench.plugin.simulation import SheetTable
-from tactbench.sensors.biotac.electrodes import ELECTRODES
+from tactbench.sensors.biotac.channels import ELECTRODES
 
 MESHES = (
     "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj, x = -12.2 mm - x of the meshes, whose "
@@ -30,14 +30,9 @@ _FACET_MM = _AXIAL * (_E7.x_mm - RAYS_FROM_MM) - _DOWN * _E7.z_mm + CORE_MM - EL
 
 
 def sheet_x(x_mm: float, height_mm: float, outer_mm: float, dome_mm: float) -> float:
-    """Return the axial coordinate on the sheet that faces a point of the core.
+    """Return the axial coordinate on the sheet that faces a point of the core at `x_mm`, `height_mm` from the axis.
 
-    Parameters
-    ----------
-    x_mm, height_mm
-        Axial place, and distance from the axis.
-    outer_mm, dome_mm
-        Radius of the finger's outer surface, and where its dome begins.
+    `outer_mm` is the radius of the finger's outer surface, whose dome begins at `dome_mm`.
     """
     if x_mm <= RAYS_FROM_MM:
         return x_mm
@@ -57,12 +52,9 @@ def ray_length(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
 
 
 def core_reach_mm(from_mm: float, ray_rad: float, angle_rad: float) -> float:
-    """Return how far the core reaches along a ray from a place of the axis, up to RAYS_FROM_MM.
+    """Return the reach of the core along a ray from a place of the axis, up to RAYS_FROM_MM.
 
-    Parameters
-    ----------
-    from_mm, ray_rad, angle_rad
-        Axial place, angle from straight up and angle around the finger.
+    `ray_rad` is the angle from straight up, `angle_rad` that around the finger.
     """
     # Where the ray meets the facet; away from it, where the facet bends back, the core's own radius.
     leaning = max(_AXIAL * math.sin(ray_rad) + _DOWN * math.cos(ray_rad) * math.cos(angle_rad), 1e-9)
@@ -109,26 +101,12 @@ SOURCE = Source(
 
 
 def film_table(outer_mm: float, dome_mm: float) -> SheetTable:
-    """Return the meshes' film on the sheet.
-
-    Parameters
-    ----------
-    outer_mm, dome_mm
-        Radius of the sheet's cylinder, and where its dome begins.
-    """
+    """Return the meshes' film on a sheet with the radius `outer_mm`, whose dome begins at `dome_mm`."""
     return SheetTable(x_mm=_places(outer_mm, dome_mm), angle_deg=ANGLES_DEG, value_mm=_FILM_MM, source=SOURCE)
 
 
 def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
-    """Return how far the outer surface lies inside cylinder and dome: core, film and a skin of one thickness.
-
-    Parameters
-    ----------
-    outer_mm, dome_mm
-        Radius of the sheet's cylinder, and where its dome begins.
-    skin_mm
-        Thickness of the skin.
-    """
+    """Return the distance of the outer surface inside cylinder and dome: core, film and a skin of one thickness."""
     reach = [(x, 0.0, outer_mm) for x in AT_X_MM]
     for degrees in AT_RAY_DEG:
         ray = math.radians(degrees)

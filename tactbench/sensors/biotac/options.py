@@ -1,4 +1,4 @@
-"""What a rig file says of a BioTac beside its link, and of a log of one."""
+"""Options of a BioTac in a rig file, and of a log of one."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class BioTacOptions(Options):
     """Of the driver and the emulator."""
 
     select: int = Field(default=1, ge=1, le=0xFF)
-    """Mask of the select lines that are active while this sensor is spoken to, line i being bit i. A board for several
+    """Mask of the select lines that are active while this sensor is addressed, line i being bit i. A board for several
     sensors may put numbers on its lines: 1, 2, 4 are the first three on the maker's [sourced: driver]."""
     frame: Annotated[tuple[str, ...], BeforeValidator(_names)] = DEFAULT_FRAME
     """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
     resends: int = Field(default=0, ge=0, le=3)
-    """How often every word is asked for again, so that words of bad parity can be replaced."""
+    """Number of times that every word is requested again, so that words of bad parity can be replaced."""
     batch_words: int | None = Field(default=None, ge=1, le=1000)
     """Words in a batch; None: a frame. Fewer where a bridge takes only short batches: a word is 14 bytes of payload."""
     batches_ahead: int = Field(default=8, ge=2, le=16)
@@ -39,6 +39,6 @@ class LogOptions(Options):
     """Of the reader of text logs."""
 
     sensor: int = Field(default=0, ge=0)
-    """Which pair of columns, from 0."""
+    """Index of the pair of columns, from 0."""
     rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     """Commands a second, where the log does not state them."""

@@ -45,14 +45,7 @@ class Disc(NamedTuple):
 
 
 class RimmedDiscs:
-    """Electrodes and excitations as discs with rims, on one conduction grid.
-
-    Parameters
-    ----------
-    x_mm, s_mm
-        (nx,), (ns,) centres of the cells.
-    electrodes, excitation
-        The discs.
+    """Electrodes and excitations as discs with rims, on the conduction grid of (nx,), (ns,) cell centres.
 
     Raises
     ------
@@ -72,7 +65,7 @@ class RimmedDiscs:
                 raise RigError(
                     f"An electrode of {disc.radius_mm:g} mm at {disc.x_mm:.2f}, {disc.s_mm:.2f} mm covers no cell of "
                     f"a conduction grid of {cell[0]:.2f} x {cell[1]:.2f} mm.",
-                    hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
+                    hint="Correct the sensor's electrode positions or its SkinSheet, or use more cells.",
                 )
             found.append((np.full(i.size, number), np.stack([i, j]), np.stack([along[i], across[j]])))
         whose, place, offset = (np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True))

@@ -6,7 +6,7 @@ the film is straight between their centres; beside a closed film, where h change
 harmonic mean is a third too small. Electrodes and excitations are equipotential contacts: cell k under contact e is
 joined to it by about ``sigma A_ke (3/h_k + 4/(pi a))``, A_ke the overlap, a the disc's radius.
 
-The first term is the exact depth average of a film fed from one face, right for h << a; alone it would let a
+The first term is the exact depth average of a film fed from one face, right for h << a; by itself it would let a
 *thinner* film conduct *better* into a small disc (for h^2 > 1.5 a^2 ln(r/a)), which no conductor does. The second is
 the disc on a half-space, 1/(4 sigma a). Their sum agrees with the method of images for a disc on a slab,
 ``R = 1/(4 sigma a) + (ln(r/(4h)) + gamma) / (2 pi sigma h)``, within 2 % of 1/(4 sigma a) for h > 1.2 a.
@@ -45,29 +45,16 @@ def faces_between(corners_mm: FloatArray) -> Faces:
 
 
 class FilmSheet:
-    """A film over electrodes on one grid; `resistances` for any thickness.
-
-    Parameters
-    ----------
-    faces
-        Faces between the cells, in the film's metric.
-    contacts
-        Electrodes and excitation on the cells.
-    """
+    """A film over electrodes on one grid, with the faces between its cells; `resistances` for any thickness."""
 
     def __init__(self, faces: Faces, contacts: RimmedDiscs) -> None:
         self._faces, self._contacts = faces, contacts
 
     def resistances(self, film_mm: FloatArray) -> FloatArray:
-        """Return the (n_electrodes, n_electrodes) resistances times sigma under `film_mm`, in 1/mm.
+        """Return the (n_electrodes, n_electrodes) resistances times sigma under a (nx, ns) film, in 1/mm.
 
         Entry (i, j): the potential of electrode i, the excitations grounded, while a unit of current enters at j and
         leaves by the excitations.
-
-        Parameters
-        ----------
-        film_mm
-            (nx, ns) thickness, positive everywhere.
 
         Raises
         ------

@@ -44,14 +44,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     Words that the log lacks are marked missing; sequence numbers count from the log's own frame numbers. The order of a
     frame is that of most frames of the log. Error replies cannot be distinguished from bad parity, since the log has
     only the resulting number. Times are those of the log; without any they are row numbers over the rate, if the option
-    `rate_hz` or the header states one. The rate of a log with times is measured from its first and last row.
-
-    Parameters
-    ----------
-    path
-        The file.
-    options
-        As :class:`~tactbench.sensors.biotac.options.LogOptions`.
+    `rate_hz` or the header states one. The rate of a log with times is measured from its first and last row. Options
+    are those of :class:`~tactbench.sensors.biotac.options.LogOptions`.
 
     Raises
     ------

@@ -11,7 +11,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState, Transducer
-from tactbench.sensors.biotac.electrodes import NAMES
+from tactbench.sensors.biotac.channels import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.meshes import sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
@@ -61,16 +61,7 @@ def build(
 ) -> Transducer:
     """Return the BioTac's transducer: readings in counts, before noise, rounding and clipping.
 
-    Parameters
-    ----------
-    sensor
-        The BioTac's spec, perhaps with other parameters.
-    grid
-        The grid on which skin states will come.
-    channel_names
-        Names of channels: E1 to E19 and PDC.
-    refinement
-        Conduction cells per skin cell and axis.
+    `channel_names` are of E1 to E19 and PDC; `refinement` is that of :func:`refined`.
 
     Raises
     ------

@@ -3,19 +3,20 @@
 A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
 [sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
 ``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
-(IM: ``CanBusSkin.cpp``) unless said. Nothing here has met a real board.
+(IM: ``CanBusSkin.cpp``) unless stated. Nothing here has met a real board.
 """
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, UsageError
+from tactbench.plugin import Block, Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 
 BIT_RATE = 1_000_000
@@ -97,6 +98,15 @@ class VersionRequest:
 
 
 Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | OldSetup | OldSetup2 | VersionRequest
+_LAYOUTS: dict[type[Command], tuple[int, str, bytes, bytes]] = {
+    BoardSetup: (0x4D, "<3B", b"", b""),
+    TriangleSetup: (0x50, "<4BH", b"", b""),
+    Transmit: (0x07, "<B", b"", b""),
+    OldSetup: (0x4C, "<BHH", b"\x01\x01", b""),
+    OldSetup2: (0x4E, "<4BH", b"", b"\x0a"),
+    VersionRequest: (0x1C, "<2B", b"", b""),
+}
+"""First byte of each command, layout of its fields, and fixed bytes before and after them."""
 
 
 @dataclass(frozen=True)
@@ -108,53 +118,38 @@ class Version:
     firmware: tuple[int, int, int]
     protocol: tuple[int, int]
     fits: bool
-    """The board speaks the protocol asked for."""
+    """The board speaks the requested protocol."""
 
 
 def polling_id(board: int, source: int = 0) -> int:
-    """Return the identifier of a command to `board` (15: to all) from `source`; raises UsageError outside 0 to 15."""
-    return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
+    """Return the identifier of a command to `board` (15: to all) from `source`."""
+    return POLLING << 8 | source << 4 | board
 
 
 def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
-    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15.
-
-    `old`: of class 3, as early firmware sends.
-    """
-    kind = OLD_SKIN if old else SKIN
-    return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
+    """Return the identifier of a triangle's two frames; `old`: of class 3, as early firmware sends."""
+    return (OLD_SKIN if old else SKIN) << 8 | board << 4 | triangle
 
 
 def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
-    """Return the frame that carries `command`.
-
-    Parameters
-    ----------
-    board
-        Destination, 0 to 14, or :data:`BROADCAST`.
-    source
-        Sender, 0 for a host.
+    """Return the frame that carries `command` to a board, 0 to 14, or :data:`BROADCAST`, from `source`, 0 for a host.
 
     Raises
     ------
     UsageError
         If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
     """
-    match command:
-        case BoardSetup(skin_type, period_ms, no_load):
-            numbers = [0x4D, skin_type, period_ms, no_load]
-        case TriangleSetup(first, last, shift, enabled, cdc):
-            _within("first triangle", first, _within("last triangle", last, 15))
-            numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
-        case Transmit(on):
-            numbers = [0x07, 0 if on else 1]
-        case OldSetup(timer, cdc, time):
-            numbers = [0x4C, 1, 1, timer, *_low_high(cdc), *_low_high(time)]
-        case OldSetup2(shift, shift_3_1, no_load, param, enabled_mask):
-            numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
-        case VersionRequest(major, minor):
-            numbers = [0x1C, major, minor]
-    return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
+    code, layout, before, after = _LAYOUTS[type(command)]
+    if isinstance(command, TriangleSetup) and not 0 <= command.first <= command.last <= 15:
+        raise UsageError(f"Triangles {command.first} to {command.last} do not ascend.", hint="Give 0 to 15.")
+    numbers = (not command.on,) if isinstance(command, Transmit) else astuple(command)
+    try:
+        data = bytes([code]) + before + struct.pack(layout, *numbers) + after
+    except struct.error as error:
+        raise UsageError(
+            f"{command} has a number that does not fit its field.", hint=f"Correct it: {error}."
+        ) from error
+    return CanFrame(polling_id(board, source), data)
 
 
 def read_command(frame: CanFrame) -> tuple[int, Command] | None:
@@ -162,28 +157,27 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
     if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
         return None
     board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
-    found: Command
-    if code == 0x4D and len(data) >= 3:
-        found = BoardSetup(*data[:3])
-    elif code == 0x50 and len(data) >= 6:
-        found = TriangleSetup(data[0], data[1], data[2], bool(data[3] & 1), data[4] | data[5] << 8)
-    elif code == 0x07 and data:
-        found = Transmit(data[0] == 0)
-    elif code == 0x4C and len(data) >= 7:
-        found = OldSetup(data[2], data[3] | data[4] << 8, data[5] | data[6] << 8)
-    elif code == 0x4E and len(data) >= 6:
-        found = OldSetup2(data[0], data[1], data[2], data[3], data[4] | data[5] << 8)
-    elif code == 0x1C and len(data) < 7:  # with 7 it is a board's answer
-        found = VersionRequest(*(*data, 0, 0)[:2])
-    else:
+    kind = next((kind for kind, layout in _LAYOUTS.items() if layout[0] == code), None)
+    if kind is None or (kind is VersionRequest and len(data) >= 7):  # with 7 it is a board's answer
         return None
-    return board, found
+    _, layout, before, _ = _LAYOUTS[kind]
+    if kind is VersionRequest:
+        data = data + bytes(2)
+    if len(data) < len(before) + struct.calcsize(layout):
+        return None
+    numbers = struct.unpack_from(layout, data, len(before))
+    if kind is Transmit:
+        return board, Transmit(numbers[0] == 0)
+    if kind is TriangleSetup:
+        first, last, shift, enabled, cdc_offset = numbers
+        return board, TriangleSetup(first, last, shift, bool(enabled & 1), cdc_offset)
+    return board, kind(*numbers)
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
-    """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
-    numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
-    return CanFrame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
+    """Return the answer of `board` to the :class:`VersionRequest` of `to`."""
+    numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, version.fits)
+    return CanFrame(polling_id(to, board), bytes(numbers))
 
 
 def read_version(frame: CanFrame) -> tuple[int, Version] | None:
@@ -199,28 +193,14 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 def skin_frames(
     board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
-    """Return head and tail.
+    """Return head and tail of (12,) readings, 0 to 255.
 
-    Parameters
-    ----------
-    taxels
-        (12,) readings, 0 to 255.
-    word
-        Error word: bit 4 + i is taxel i out of range, then :data:`NO_ACK` and :data:`NOT_CONNECTED`.
-
-    Raises
-    ------
-    UsageError
-        If there are not 12 readings or a number does not fit its field.
+    Bit 4 + i of the error word is taxel i out of range, beside :data:`NO_ACK` and :data:`NOT_CONNECTED`.
     """
-    if len(taxels) != TAXELS:
-        raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
-    values = bytes(_within("a reading", value, 255) for value in taxels)
-    identifier = skin_id(board, triangle, old=old)
-    errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
+    values, identifier = bytes(taxels), skin_id(board, triangle, old=old)
     return (
         CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
-        CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
+        CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + word.to_bytes(2, "big"), t_ns=t_ns),
     )
 
 
@@ -232,14 +212,8 @@ def out_of_range(word: int) -> tuple[int, ...]:
 def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
     """Return the byte a board sends, and whether it calls the taxel out of range [sourced: IF theSkin, fill].
 
-    Parameters
-    ----------
-    change
-        Converter result minus baseline minus drift; pressure makes it positive and the byte smaller.
-    no_load
-        Byte at rest.
-    shift
-        Bits of the change that are dropped (arithmetically).
+    `change` is the converter's result minus baseline minus drift: pressure makes it positive and the byte smaller.
+    `no_load` is the byte at rest, `shift` the bits of the change that are dropped (arithmetically).
     """
     least, most = -((255 - no_load) << shift), no_load << shift
     beyond = change <= 2 * least or change >= 2 * most
@@ -410,33 +384,13 @@ class SkinDecoder:
 
 
 def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:
-    """Return samples of one triangle as a block of the sensor's stream.
+    """Return samples of one triangle as a block of the sensor's stream, without a sequence: the device has no counter.
 
-    Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well]. The block has no
-    sequence, which stands for a device's own counter.
-
-    Raises
-    ------
-    RigError
-        If the samples are of several triangles.
+    Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well].
     """
-    if len({(sample.board, sample.triangle) for sample in samples}) > 1:
-        raise RigError("The samples are of several triangles.", hint="Make one block for each (board, triangle).")
     return Block(
         stream=stream,
         t_ns=np.array([sample.t_ns for sample in samples], dtype=np.int64),
         data=np.array([list(sample.taxels) for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
         quality=np.array([sample.quality for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
     )
-
-
-def _within(what: str, number: int, most: int) -> int:
-    if not 0 <= number <= most:
-        raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
-    return number
-
-
-def _low_high(number: int) -> tuple[int, int]:
-    """Little-endian bytes of a 16-bit number."""
-    _within("a 16-bit number", number, 0xFFFF)
-    return number & 0xFF, number >> 8

@@ -93,7 +93,7 @@ class FingertipDriver(Driver):
         Raises
         ------
         LinkTimeout
-            If nobody on the bus acknowledges (socketcan).
+            If no node of the bus acknowledges (socketcan).
         LinkUnplugged
             If the adapter is gone.
         """
@@ -111,7 +111,7 @@ class FingertipDriver(Driver):
                 version = answer[1]
                 protocol = "{}.{}".format(*version.protocol)
                 if not version.fits:
-                    protocol += f" (not {request.major}.{request.minor}, which was asked for)"
+                    protocol += f" (not {request.major}.{request.minor}, which was requested)"
                 model = "MTB4" if version.board_type == 11 else f"type {version.board_type}"
                 return {**about, "model": model, "firmware": "{}.{}.{}".format(*version.firmware), "protocol": protocol}
         return {

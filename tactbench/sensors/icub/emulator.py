@@ -1,4 +1,4 @@
-"""A board with an iCub fingertip, alone on a CAN bus, as a model without input or output: frames in, frames out.
+"""A board with an iCub fingertip, the only one on a CAN bus, as a model without input or output: frames in, frames out.
 
 What the board does is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
 ``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; where the model guesses, it is
@@ -84,7 +84,7 @@ class BoardFault(Fault):
     }
 
     half: Literal["head", "tail"] | None = None
-    """Which frames are dropped, doubled or late; None: both."""
+    """Half of the sample whose frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
     """Bits of the error word."""
@@ -113,14 +113,8 @@ def frame_s(frame: CanFrame) -> float:
 class Bus(DeviceEmulator):
     """A bus with one board, which sends one frame at a time; commands take no time on it [assumed: they are rare].
 
-    Parameters
-    ----------
-    senses
-        Second -> counts of taxels, rounded, and clipped to 0-255; those left out are at rest.
-    board, triangle
-        Where the fingertip is; the board's other triangles have no chip.
-    faults
-        What is wrong with the board; the list may be changed at any time.
+    `senses` maps a second to counts of taxels, rounded and clipped to 0-255; those left out are at rest. The board's
+    triangles beside that of the fingertip have no chip. `faults` may be changed at any time.
     """
 
     def __init__(self, senses: Senses, *, board: int = 14, triangle: int = 0, faults: Iterable[BoardFault] = ()):

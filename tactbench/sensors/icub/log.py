@@ -30,15 +30,10 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     """Read one fingertip's samples from a log in a format of python-can: candump's, Vector's ASC and BLF, ...
 
     Times count from the log's first message. Samples are those that the driver makes of the same frames; one whose
-    time is not after that of the sample before it is kept out and counted. Buses of a log of several are not told
-    apart.
+    time is not after that of the sample before it is kept out and counted. Several buses in one log are not
+    distinguished.
 
-    Parameters
-    ----------
-    path
-        Ends in ``.log``, ``.asc``, ``.blf`` ...
-    options
-        :class:`~tactbench.sensors.icub.options.LogOptions`.
+    Options are those of :class:`~tactbench.sensors.icub.options.LogOptions`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a rig file may say of a fingertip, and what may be said of a log of its bus."""
+"""Options of a fingertip in a rig file, and of a log of its bus."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class FingertipOptions(Options):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """What sets the board up, in order; afterwards it takes a baseline and does not send, MTB4's old set-up aside.
+        """Commands of the set-up, in order; then the board takes a baseline and, but for MTB4's old one, does not send.
 
         [sourced: icub-main CanBusSkin.cpp, but for the stop at the beginning: the board may be sending]
         """
@@ -64,7 +64,7 @@ class FingertipOptions(Options):
 
 
 class LogOptions(Options):
-    """Which triangle of a log is the fingertip, and what the log does not say."""
+    """Triangle of a log that is the fingertip, and what the log does not state."""
 
     board: int | None = Field(default=None, ge=0, le=14)
     """None: the only one in the log."""

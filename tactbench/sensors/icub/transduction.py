@@ -19,20 +19,9 @@ second: 0.17 % and 2.5 %, and weights that are never negative."""
 
 
 def taxel_weight(grid: SkinGrid, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
-    """Return the share of each cell in a taxel's reading.
+    """Return the (nx, ns) share of each cell in a taxel's reading, at least zero, sum 1.
 
-    Parameters
-    ----------
-    grid
-        Cell centres.
-    centre_mm
-        Axial place and arc length of the taxel.
-    radius_mm
-        Where the flat top ``exp(-(r^2/a^2)^4)`` falls.
-
-    Returns
-    -------
-    (nx, ns), at least zero, sum 1.
+    `centre_mm` is axial place and arc length of the taxel; the flat top ``exp(-(r^2/a^2)^4)`` falls at `radius_mm`.
 
     Raises
     ------
@@ -58,15 +47,6 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
     """Return the fingertip's transducer: ``rest - gain (C/C0 - 1)`` in counts, before noise, rounding and clipping.
 
     C/C0 is ``sum W_i h / (h - u)`` over a taxel's cells, with the plates never nearer than `least_gap` of h.
-
-    Parameters
-    ----------
-    sensor
-        The fingertip's spec, perhaps with other parameters.
-    grid
-        The grid on which skin states will come.
-    channel_names
-        Names of taxels.
 
     Raises
     ------

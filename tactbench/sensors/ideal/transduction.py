@@ -22,15 +22,6 @@ def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -
 def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
     """Return the ideal grid's transducer: readings in counts, exact for a pressure that is constant in each cell.
 
-    Parameters
-    ----------
-    sensor
-        The ideal grid's spec, perhaps with other taxels.
-    grid
-        The grid on which skin states will come.
-    channel_names
-        Names of taxels.
-
     Raises
     ------
     RigError

@@ -19,11 +19,6 @@ def test_the_default_leaves_the_sheets_own_cells(specs):
     assert Fidelity(cells_factor=1.3).cells(specs["icub"].skin.sheet) == (60, 64)
 
 
-def test_a_factory_gets_what_it_names():
-    assert DEFAULT.options(lambda sensor, grid, wanted: None) == {}
-    assert DEFAULT.options(lambda sensor, grid, wanted, *, refinement=2: None) == {"refinement": 2}
-
-
 GRIDS = []
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
-from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tests.rigs.twin.conftest import q
 
 SHEET = SkinSheet(x_min=q(-10), x_max=q(10), arc=q(20), cells=(40, 50))
@@ -51,18 +51,6 @@ def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
     np.testing.assert_allclose(sphere, math.cos(0.5) * 2 * ring * np.sin(grid.s_mm / 16.0) ** 2, atol=1e-14)
 
 
-def test_the_sheet_has_the_domes_own_area():
-    # Archimedes: a strip of the sheet has the area of the sphere's zone.
-    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 101)
-    pole = Contact(math.inf, 0.0, 0.0)
-    seen = np.broadcast_arrays(*around_mm(SkinGrid(x_mm=x, s_mm=s), pole, 8.0, DOME))
-    place = np.stack(seen, axis=-1)
-    along, around = np.diff(place, axis=0)[:, :-1], np.diff(place, axis=1)[:-1]
-    area = np.linalg.norm(np.cross(along, around), axis=-1).sum(axis=1)
-    # Flat pieces of a sphere, on cells of 0.002 mm; the last rings by the pole are the worst.
-    np.testing.assert_allclose(area[:-80], 0.002 * 16.0, rtol=5e-3)
-
-
 def relief(value):
     return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=q(0).source)
 
@@ -87,7 +75,7 @@ def test_a_table_is_met_at_its_entries_straight_between_and_even_beyond():
 @pytest.mark.parametrize("wrong", [{"x_mm": (1.0, 1.0)}, {"value_mm": ((1.0, math.nan), (1.0, 1.0))}])
 def test_a_table_that_is_none_is_refused(wrong):
     given_ = {"x_mm": (0.0, 1.0), "angle_deg": (0.0, 9.0), "value_mm": ((1.0, 1.0), (1.0, 1.0))}
-    with pytest.raises(ValueError, match=r"ascending axes|finite number"):
+    with pytest.raises(ValueError, match=r"ascending|finite"):
         SheetTable(**{**given_, **wrong}, source=relief(0.0).source)
 
 

@@ -53,7 +53,6 @@ def test_a_slow_ramp_goes_without_creep_and_the_bound_holds(sensors):
 
 OFF_THE_NOMINAL_PLACE = [
     ("biotac", {"radius": 2.0, "end": 12.0, "x": 4.0, "s": 1.0}),
-    ("biotac", {"radius": 2.0, "x": 0.1, "s": 3.0, "tilt": 12.0}),
     ("icub", {"radius": None, "x": -1.0, "s": 1.0, "tilt": 10.0}),
 ]
 

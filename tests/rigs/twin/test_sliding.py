@@ -12,7 +12,6 @@ from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.channels import channels_for
 from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
     ChannelTarget,
     ForceRamp,
@@ -23,7 +22,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Environment, Slide, Surface
 from tests.oracles.closed_forms import CattaneoMindlin
-from tests.rigs.twin.conftest import SILENT, TWIN, named, q
+from tests.rigs.twin.conftest import SILENT, TWIN, q
 
 DESCRIPTOR = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
 EDGES = (2, 10, 30, 100, 200, 500, 1000)
@@ -144,15 +143,6 @@ def test_a_recorded_stick_ratio_is_that_of_cattaneo_and_mindlin(record):
     assert np.abs(found["stick_ratio"][loading] / sticking - 1)[before].max() < 0.02
 
 
-def test_a_scene_that_only_presses_has_no_tangential_channels(record):
-    meta, streams = record(profile=_held())
-    assert [channel.name for channel in streams["force_torque"].spec.channels] == ["fz"]
-    plan = named(meta.plan)
-    for name in ("friction", "skin-vibration"):
-        assert (plan[name].included, plan[name].change) == (False, 0.0)
-    assert plan["ac-pressure"].included
-
-
 def test_a_surface_of_an_earlier_recording_is_read_by_its_wavelength():
     given = Surface().model_dump(exclude={"roll_off", "hurst"}) | {"wavelength": q(6.25), "spread": 0.5}
     assert Surface.model_validate(given).roll_off == q(6.25)
@@ -184,22 +174,3 @@ def test_sliding_over_an_even_surface_disturbs_no_slow_channel(record):
         record(profile=held, observe=("dc_pressure",), slide=slide)[1]["electrodes"].data for slide in slides
     )
     np.testing.assert_array_equal(still, moving)
-
-
-@pytest.mark.parametrize("effects", [("-friction",), ("-hum", "-ac-pressure", "+all")])
-def test_effects_asked_for_or_left_out_do_no_harm(record, effects):
-    for slide in (None, _slide(20.0)):
-        _, streams = record(profile=_held(seconds=2.0), slide=slide, simulation=Simulation(effects=effects))
-        assert len(streams["vibration"].data) == 4400
-
-
-@pytest.mark.parametrize("wrong", [{"speed": q(0.0, "mm/s")}, {"start": q(-1.0, "s")}, {"duration": q(0.0, "s")}])
-def test_impossible_slides_are_refused(wrong):
-    with pytest.raises(ValueError, match="slide"):
-        Slide(**{"speed": q(1.0, "mm/s"), "start": q(1.0, "s"), **wrong})
-
-
-@pytest.mark.parametrize("wrong", [{"kinetic_friction": q(0.9, "1")}, {"roll_off": q(0.0)}, {"hurst": q(1.5, "1")}])
-def test_impossible_surfaces_are_refused(wrong):
-    with pytest.raises(ValueError, match=r"static >= kinetic|roll-off is above 0, a Hurst"):
-        Surface(**wrong)

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from tactbench.core.spec.drive import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, Placement, RigError, Scene
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.preparation import MOST_SAMPLES, check_numbers
@@ -24,6 +25,7 @@ def test_an_ordinary_scene_passes_and_an_infinite_radius_is_a_flat_surface():
         ({"environment": Environment().model_copy(update={"noise_scale": math.inf})}, "environment noise scale"),
         ({"indenter": Indenter(radius=q(-math.inf))}, "indenter radius"),
         ({"profile": ForceRamp(samples=MOST_SAMPLES + 1)}, "samples"),
+        ({"drive": ForceLoop(delay=q(-1.0, "ms"))}, "drive delay"),
     ],
 )
 def test_a_number_that_is_none_is_named(part, says):

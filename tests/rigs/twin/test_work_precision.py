@@ -52,7 +52,7 @@ def test_it_runs_for_a_skin_and_says_what_it_cannot_have(sensors, name, has_it):
     assert ("closed-form" in {point.rung for point in points}) is has_it
 
 
-@pytest.mark.parametrize("radius", [None, 2.0, 40.0])
+@pytest.mark.parametrize("radius", [None, 2.0])
 def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning_as_the_reference_rung_does(bonded, radius):
     # Warnings are errors here. Flat, a guess from neighbouring loads leaves the contact altogether.
     tables = [_table(bonded, radius, rung) for rung in ("default", "reference")]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.sensors.biotac.electrodes import ELECTRODES
+from tactbench.sensors.biotac.channels import ELECTRODES
 from tactbench.sensors.biotac.film import core_mm, mid_film_mm, spectral_interpolation
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM
 from tactbench.sensors.biotac.sheet import faces_between

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import RigError
-from tactbench.sensors.biotac.electrodes import ELECTRODES, NAMES
+from tactbench.sensors.biotac.channels import ELECTRODES, NAMES
 from tactbench.sensors.biotac.spec import SPEC
 from tactbench.sensors.biotac.transduction import Electrodes, build
 from tests.sensors.skin_states import dent, grid_of, state_of
@@ -78,7 +78,7 @@ def test_pressure_alone_solves_no_film():
     # A film that no requested channel reads is not solved: this one would be refused.
     state = state_of(SPEC, GRID, np.full((64, 64), np.nan))
     assert reading(state, ["PDC"]) == pytest.approx([2500.0])
-    with pytest.raises(RigError, match="finite and positive"):
+    with pytest.raises(RigError, match="thickness"):
         reading(state, ["E1"])
 
 

@@ -155,7 +155,6 @@ def test_version_as_the_firmware_lays_it_out():
     [
         lambda: command_frame(14, BoardSetup(period_ms=256)),
         lambda: command_frame(14, TriangleSetup(first=5, last=4)),
-        lambda: skin_frames(14, 3, [0] * 11),
         lambda: SkinDecoder(float("nan")),
     ],
 )

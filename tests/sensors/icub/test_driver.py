@@ -146,7 +146,7 @@ def test_identify():
 
 def test_a_board_that_does_not_say_its_version_can_be_read():
     driver, link = in_virtual_time(faults=("unplugged:end_s=0.4",))
-    assert driver.identify()["firmware"].startswith("no answer within 0.5 s")
+    assert "model" not in driver.identify()
     assert link.now_s == pytest.approx(0.5)
     driver.start()
     assert len(driver.read(0.1)) == 1
@@ -265,8 +265,8 @@ def test_its_own_frames_may_come_back():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"skin_type": 7}, "0, 1, 2 or 8"),
-        ({"old_setup": True, "period_ms": 20}, "old set-up has neither"),
+        ({"skin_type": 7}, "skin_type"),
+        ({"old_setup": True, "period_ms": 20}, "period_ms"),
     ],
 )
 def test_options_that_cannot_be_are_refused_before_the_link_is_opened(options, said):

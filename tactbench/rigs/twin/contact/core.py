@@ -1,6 +1,6 @@
 """The rigid core under a fluid-backed skin, which carries load where the film is closed.
 
-Imported only when a load closes the film. Below that load the solution without the core is the solution with it, so
+Added only when a load closes the film. Below that load the solution without the core is the solution with it, so
 leaving it out changes nothing.
 """
 

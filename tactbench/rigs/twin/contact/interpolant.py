@@ -51,26 +51,15 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-_PIECES = 8
-"""Number of pieces of an interval for bounding the slope."""
 _ROUNDING_N = 0.05
 """Offset under the power, without which its slope at the break would be infinite."""
 
 
 class Interpolant:
-    """Piecewise cubic in the load.
+    """Piecewise cubic in (n,) ascending loads, n >= 2, of (n, c) values.
 
-    Parameters
-    ----------
-    loads
-        (n,) ascending, n >= 2.
-    values
-        (n, c)
-    breaks
-        Indices of nodes where one cubic ends and the next begins.
-    power
-        Beyond the last break the cubics run in ``(load - load at that break) ** power``, rounded off; elsewhere in the
-        load itself.
+    `breaks` are indices of nodes where one cubic ends and the next begins. Beyond the last of them the cubics run in
+    ``(load - load at that break) ** power``, rounded off; elsewhere in the load itself.
     """
 
     def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
@@ -104,20 +93,16 @@ class Interpolant:
     def steepest(self, low: float, high: float) -> FloatArray:
         """Return (c,) upper bounds of the absolute slopes between two loads within the nodes' range.
 
-        A cubic's slope is a parabola: on each piece its ends and its vertex. Where the cubics run in a power of the
-        load the factor between the two slopes is monotone, so that its larger end bounds it on a piece.
+        Whole intervals are looked at. A cubic's slope is a parabola: its ends and its vertex. Where the cubics run in a
+        power of the load the factor between the two slopes is monotone, so that its larger end bounds it.
         """
-        inner = np.linspace(self.loads[:-1], self.loads[1:], _PIECES, endpoint=False).T.reshape(-1)
-        inside = (inner > low) & (inner < high)
-        edges = np.concatenate([[low], inner[inside], [high]])
-        first, last = edges[:-1], edges[1:]
-        at = np.clip(np.searchsorted(self.loads, 0.5 * (first + last), side="right") - 1, 0, self.loads.size - 2)
+        first, last = np.searchsorted(self.loads, [low, high], side="right") - 1
+        at = np.arange(min(first, self.loads.size - 2), min(last, self.loads.size - 2) + 1)
         _, b, c, d = self._cubics[:, at]
-        t0, t1 = ((self._bent(load) - self._x[at])[:, None] for load in (first, last))
-        curved = d != 0
-        vertex = np.clip(np.where(curved, -c / np.where(curved, 3 * d, 1.0), t0), t0, t1)
-        parabola = [np.abs(b + t * (2 * c + 3 * d * t)) for t in (t0, vertex, t1)]
-        factor = np.maximum(self._stretch(first), self._stretch(last))[:, None]
+        end = np.diff(self._x)[at][:, None]
+        vertex = np.clip(-c / np.where(d != 0, 3 * d, np.inf), 0.0, end)
+        parabola = [np.abs(b + t * (2 * c + 3 * d * t)) for t in (0.0, vertex, end)]
+        factor = np.maximum(self._stretch(self.loads[at]), self._stretch(self.loads[at + 1]))[:, None]
         out: FloatArray = (np.maximum.reduce(parabola) * factor).max(axis=0)
         return out
 

@@ -1,6 +1,6 @@
 """Tables of readings against load, solved at a few loads only.
 
-Quasi-static contact depends on time through the force alone. So the skin is solved at a few loads, all wanted readings
+Quasi-static contact depends on time only through the force. So the skin is solved at a few loads, all wanted readings
 are kept, and a shape-preserving cubic between the nodes answers for every sample. What an interpolant through all
 *other* nodes misses at a node is the reported bound: an interval twice as wide errs by more than the one at hand.
 """
@@ -41,6 +41,10 @@ _TOUCH_DOWN_N = 0.01
 """Width of the bracket of the load at which the film closes."""
 
 
+_SKIN = 3
+"""Number of the skin's scalars, which stand before the readings."""
+
+
 class SkinCurves(NamedTuple):
     """The skin's scalars at (m,) loads."""
 
@@ -66,12 +70,11 @@ class LoadTable:
     error: FloatArray
     """(channels,) three times the largest difference of a solved reading from the interpolant through the others."""
     interpolant: Interpolant
-    curves: Interpolant
-    """Depth, contact radius and fluid pressure against load."""
+    """Depth, contact radius and fluid pressure against load, then the readings."""
 
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
-        return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))
+        return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))[:, _SKIN:]
 
     def steepest(self, low_n: float, high_n: float) -> FloatArray:
         """Return the (channels,) largest changes of a reading with force between two forces, per newton.
@@ -79,7 +82,7 @@ class LoadTable:
         Of this table as it is used, the ends at which it is held included.
         """
         low, high = np.clip([low_n, high_n], 0.0, self.loads_n[-1])
-        return self.interpolant.steepest(float(low), float(high))
+        return self.interpolant.steepest(float(low), float(high))[_SKIN:]
 
     def per_mm(self, of: Callable[[FloatArray], FloatArray], force_n: FloatArray) -> FloatArray:
         """Return the (n, k) slopes against depth, at (n,) forces, of a function `of` force: chords of a fiftieth."""
@@ -92,34 +95,28 @@ class LoadTable:
 
     def skin(self, force_n: FloatArray) -> SkinCurves:
         """Return depth, contact radius and fluid pressure at (m,) forces, held at the ends of the table."""
-        depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T
-        return SkinCurves(depth_mm=depth, contact_radius_mm=radius, fluid_pressure_mpa=pressure)
+        return SkinCurves(*self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1])).T[:_SKIN])
 
 
 class _Builder:
     def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray]) -> None:
         self._press = press
         self._read = read
-        self.nodes: dict[float, tuple[FloatArray, FloatArray]] = {}
-        """Load -> scalars of the skin, and readings."""
+        self.nodes: dict[float, FloatArray] = {}
+        """Load -> scalars of the skin, then its readings."""
         self.residual = 0.0
         self.closed: dict[float, bool] = {}
 
-    def node(self, force: float) -> FloatArray:
+    def node(self, force: float) -> None:
         if force not in self.nodes:
             state = self._press(force)
-            self.nodes[force] = (whole_skin(state), self._read(state))
+            self.nodes[force] = np.concatenate([whole_skin(state), self._read(state)])
             self.residual = max(self.residual, state.residual)
             self.closed[force] = force > 0 and self._press.closing_at(force) > 0
-        return self.nodes[force][1]
 
     def interpolant(self, touch_down: tuple[float, float] | None, without: float | None = None) -> Interpolant:
         loads = [load for load in sorted(self.nodes) if load != without]
-        return through(loads, [self.nodes[load][1] for load in loads], touch_down)
-
-    def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
-        loads = sorted(self.nodes)
-        return through(loads, [self.nodes[load][0] for load in loads], touch_down)
+        return through(loads, [self.nodes[load] for load in loads], touch_down)
 
 
 def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
@@ -138,28 +135,17 @@ def build_table(
     tolerance: FloatArray,
     most_nodes: int = 14,
 ) -> LoadTable:
-    """Solve and tabulate one contact.
+    """Solve and tabulate the (channels,) readings of one contact up to `largest_n`; without load, the rest twice.
 
-    Parameters
-    ----------
-    press
-        Solves the skin for one force.
-    read
-        The sensor's noise-free readings of a state: (channels,).
-    largest_n
-        Upper end of the table; a table of a scene without load has the rest state twice.
-    tolerance
-        (channels,) wanted bound on the interpolation error.
-    most_nodes
-        Nodes after which refining ends even if the bound is missed: the achieved one is reported.
+    `tolerance` (channels,) is the wanted bound on the interpolation error; at `most_nodes` refining ends even if it is
+    missed: the achieved one is reported.
     """
     builder = _Builder(press, read)
-    if not largest_n > 0:
-        rest = builder.node(0.0)
-        flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
-        still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
-        return LoadTable(np.zeros(1), rest[None, :], 0.0, 0.0, None, np.zeros(rest.size), flat, still)
     builder.node(0.0)
+    if not largest_n > 0:
+        rest = builder.nodes[0.0]
+        flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
+        return LoadTable(np.zeros(1), rest[None, _SKIN:], 0.0, 0.0, None, np.zeros(rest.size - _SKIN), flat)
     for j in range(1, _SCOUTS + 1):
         builder.node(largest_n * (j / _SCOUTS) ** _SCOUTS_POWER)
     touch_down = _bracket(builder, press)
@@ -168,13 +154,12 @@ def build_table(
     loads = sorted(builder.nodes)
     return LoadTable(
         loads_n=np.array(loads),
-        readings=np.stack([builder.nodes[load][1] for load in loads]),
-        depth_mm=float(builder.nodes[largest_n][0][0]),
+        readings=np.stack([builder.nodes[load][_SKIN:] for load in loads]),
+        depth_mm=float(builder.nodes[largest_n][0]),
         residual=builder.residual,
         touch_down_n=touch_down,
         error=error,
         interpolant=builder.interpolant(touch_down),
-        curves=builder.curves(touch_down),
     )
 
 
@@ -246,7 +231,7 @@ def _refine(
         loads = sorted(builder.nodes)
         fixed = {loads[0], loads[-1], *(touch_down or ())}
         missed = {
-            load: np.abs(builder.nodes[load][1] - builder.interpolant(touch_down, load)(np.array([load]))[0])
+            load: np.abs(builder.nodes[load] - builder.interpolant(touch_down, load)(np.array([load]))[0])[_SKIN:]
             for load in loads
             if load not in fixed
         }

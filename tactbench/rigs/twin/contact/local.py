@@ -22,16 +22,7 @@ _STEPS = 60
 
 
 class LocalPress(AnyPress):
-    """Solves a load cell by cell.
-
-    Parameters
-    ----------
-    skin, medium
-        The skin as declared, and on its grid.
-    gap_mm
-        (nx, ns) gap at zero approach.
-    contact
-        Place of the apex.
+    """Solver of one contact cell by cell, given the skin as declared and on its grid, and the (nx, ns) gap.
 
     Raises
     ------

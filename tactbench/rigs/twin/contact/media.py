@@ -34,7 +34,7 @@ class Medium:
     contact_stiffness: float
     """Stiffness of the contact between indenter and skin [MPa/mm]."""
     zero_mean: bool
-    """Whether the volume under the skin is constant, so that the mean deflection is zero."""
+    """The volume under the skin is constant: the mean deflection is zero."""
     rest_thickness_mm: FloatArray
     """(nx, ns) thickness of film or layer without contact."""
     least_thickness_mm: float
@@ -44,7 +44,7 @@ class Medium:
     contact_updates: int = 0
     """Number of corrections for the penetration by the penalty; 0 where the contact stiffness is a skin property."""
     has_core: bool = False
-    """Whether a core carries load when less than `least_thickness_mm` would be left."""
+    """A core carries load when less than `least_thickness_mm` would be left."""
 
     def closing_mm(self, deflection_mm: FloatArray) -> float:
         """Return how far the skin passes the least film; above zero the core is touched."""

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.preconditioner import Preconditioner
+from tactbench.rigs.twin.contact.spectrum import LowModes
 
 TOLERANCE = 1e-6
 """Largest relative residual of a solution that is returned."""
@@ -57,15 +58,7 @@ class Solution:
 
 
 class NewtonSolver:
-    """Solver of the contact of one medium through one gap.
-
-    Parameters
-    ----------
-    medium
-        The skin.
-    gap_mm
-        (nx, ns) gap at zero approach.
-    """
+    """Solver of the contact of one medium through one (nx, ns) gap at zero approach."""
 
     def __init__(self, medium: Medium, gap_mm: FloatArray) -> None:
         self.medium = medium
@@ -85,10 +78,10 @@ class NewtonSolver:
     def start(self, force_n: float) -> FloatArray:
         """Return the unloaded skin with the indenter just touching: a guess for a first load of `force_n`."""
         vector = np.zeros(self._spectrum.size + 1)
-        # What one cell alone would take: never more than the answer, so that a piconewton is not met from 1e10 times
-        # its own depth. From 0.02 mm on the guess would leave the contact's shape behind.
-        alone = force_n / (self._spectrum.area_mm2 * self._k)
-        vector[-1] = float(self.gap_mm.min()) + min(0.02, alone)
+        # The depth of a single cell, never more than the answer: a piconewton does not start from 1e10 times its depth.
+        # From 0.02 mm on the guess would leave the contact's shape behind.
+        single = force_n / (self._spectrum.area_mm2 * self._k)
+        vector[-1] = float(self.gap_mm.min()) + min(0.02, single)
         return vector
 
     def solve(self, force_n: float, guess: FloatArray | None = None, *, tolerance: float = TOLERANCE) -> Solution:
@@ -101,7 +94,7 @@ class NewtonSolver:
         guess
             State of a neighbouring load (its ``vector``).
         tolerance
-            Largest relative residual. Where rounding of the equations' terms alone is more, what rounding leaves is
+            Largest relative residual. Where rounding of the equations' terms is more, what rounding leaves is
             returned, up to :data:`TOLERANCE`; the solution's residual states it.
 
         Raises
@@ -285,3 +278,54 @@ class NewtonSolver:
             pressure_mpa=self._k * lift,
             residual=residual,
         )
+
+
+class Preconditioner:
+    """Approximate inverse of the Hessian in deflection and approach, with ``medium.low_modes`` exact pairs of modes.
+
+    A skin is stiff against short waves, so the contact's varying stiffness matters for long waves only. These few
+    modes, with the approach, form a small dense matrix that is factorised once a Newton step; the others have their
+    diagonal.
+    """
+
+    def __init__(self, medium: Medium) -> None:
+        from scipy.linalg import lapack
+
+        self._lapack: Any = lapack
+        self._medium = medium
+        self._spectrum = medium.spectrum
+        self._low = LowModes(medium.spectrum, medium.stiffness, count=medium.low_modes, zero_mean=medium.zero_mean)
+        size = self._low.size
+        self._matrix = np.empty((size + 1, size + 1), order="F")
+        self._right = np.empty(size + 1)
+        self._diagonal = self._spectrum.diagonal(medium.stiffness)
+        self._inverse = np.empty_like(self._diagonal)
+        self._out = np.empty(self._diagonal.size + 1)
+
+    def update(self, stiffness: FloatArray, contact: FloatArray) -> None:
+        """Adapt to a (nx, ns) tangent stiffness, of which `contact` is the indenter's part."""
+        size, matrix = self._low.size, self._matrix
+        self._low.matrix(stiffness, matrix)
+        coupling = self._low.take(self._spectrum.of(contact))
+        total = float(contact.sum())
+        matrix[size, :size] = -coupling
+        matrix[:size, size] = -coupling
+        # A floor for the approach: without contact its own stiffness would vanish.
+        matrix[size, size] = total * (1 + 1e-12) + 1e-6 * self._medium.contact_stiffness
+        self._factor, _ = self._lapack.dpotrf(matrix, lower=1, clean=0)
+        # Stiff modes are short waves: they live where the local stiffness is large, so its mean is too little for them.
+        np.add(self._diagonal, 2.0 * float(stiffness.mean()), out=self._inverse)
+        np.reciprocal(self._inverse, out=self._inverse)
+
+    def __call__(self, vector: FloatArray) -> FloatArray:
+        """Return the approximate inverse times a flat (size + 1,) vector; the result is overwritten by the next."""
+        out, right = self._out, self._right
+        np.multiply(self._inverse, vector[:-1], out=out[:-1])
+        right[:-1] = self._low.take(vector)
+        right[-1] = vector[-1]
+        solution, _ = self._lapack.dpotrs(self._factor, right, lower=1)
+        self._low.put(solution[:-1], out)
+        out[-1] = solution[-1]
+        if self._medium.zero_mean:
+            out[0] = 0.0
+        return out

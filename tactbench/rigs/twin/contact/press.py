@@ -66,18 +66,8 @@ def whole_skin(state: SkinState) -> FloatArray:
 class Press(AnyPress):
     """Solver of one contact by the minimiser of the whole energy.
 
-    Parameters
-    ----------
-    medium
-        The skin without a core.
-    gap_mm
-        (nx, ns) gap at zero approach.
-    contact
-        Where the apex is.
-    core
-        Function that adds the core to a skin, called when a load first closes the film; None: there is no core.
-    fluid_pressure
-        Whether states carry the pressure of the fluid.
+    `medium` has no core yet; `core` adds it when a load first closes the film (None: there is none). `gap_mm` (nx, ns)
+    is the gap at zero approach. With `fluid_pressure` states carry the pressure of the fluid.
     """
 
     def __init__(
@@ -163,7 +153,7 @@ class Press(AnyPress):
         return guess
 
     def _fluid_pressure(self, solution: Solution) -> float:
-        """Return the multiplier of the constant volume: what the contact brings in and the skin does not carry."""
+        """Return the multiplier of the constant volume: the mean contact pressure that the skin does not carry."""
         if not (self.medium.zero_mean and self._wants_fluid_pressure):
             return 0.0
         local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))

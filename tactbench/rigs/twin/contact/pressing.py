@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from collections.abc import Callable
@@ -52,7 +53,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     if not names:
         return press, whole_skin
     grid = press.medium.grid
-    read = _reader(run.sensor, grid, names, fidelity)
+    read = _reader(run.sensor, grid, names)
     if not (run.tangential or run.sensor.spec.reads_shear):
         return press, read
     from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
@@ -70,31 +71,18 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
         from tactbench.rigs.twin.contact.local import LocalPress
 
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
-    core: Callable[[Medium], Medium] | None = None
+    core = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
-        where = run.lent["core"]
-
-        def core(medium: Medium) -> Medium:
-            made: Medium = load_object(where)(medium, skin)
-            return made
-
-    return Press(
-        medium_of(skin, grid),
-        gap,
-        run.contact,
-        core=core,
-        fluid_pressure=run.fluid_pressure,
-        tolerance=fidelity.newton_tolerance,
-    )
+        core = functools.partial(load_object(run.lent["core"]), skin=skin)
+    tolerance, fluid_pressure = fidelity.newton_tolerance, run.fluid_pressure
+    return Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=fluid_pressure, tolerance=tolerance)
 
 
-def _reader(
-    sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
-) -> Callable[[SkinState], FloatArray]:
+def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:
     """Return the sensor's transducer, with a check of each result."""
     try:
         factory: TransducerFactory = load_object(sensor.transducer or "")
-        transducer: Transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
+        transducer: Transducer = factory(sensor.spec, grid, names)
     except RigError as error:
         raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
 

@@ -84,14 +84,8 @@ class SlideTable:
     ) -> FloatArray:
         """Return the (n, channels) change of the readings.
 
-        Parameters
-        ----------
-        force_n
-            (n,) force that the response follows: the normal one, or one that lags behind it.
-        load_n, tangential_n
-            (n,) true normal and tangential force.
-        stick_ratio
-            (n,) radius of the part that sticks over that of the contact; 0 where everything slips.
+        The response follows `force_n` (n,), the true normal force `load_n` or one that lags behind it. `stick_ratio` is
+        the radius of the part that sticks over that of the contact; 0 where everything slips.
         """
         share, inner, b = traction_shares(load_n, tangential_n, stick_ratio, self.friction)
         at = np.clip(force_n, 0.0, self.proportional.loads[-1])

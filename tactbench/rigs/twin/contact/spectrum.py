@@ -15,14 +15,9 @@ from tactbench.plugin.simulation import SkinGrid
 
 
 class Spectrum:
-    """Transforms of one grid.
+    """Transforms of one grid: of a periodic sheet, or of one that is mirrored at both ends along x.
 
-    Parameters
-    ----------
-    grid
-        Cell centres; the sheet is taken as periodic.
-    mirrored
-        Both ends along x are mirrors instead: fields are sums of cosines there, and go on as their own images.
+    There fields are sums of cosines and go on as their own images.
     """
 
     def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -36,7 +35,7 @@ class _Tabulated:
     remarks: Mapping[str, Scalar]
 
 
-_TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
+_TABLES: dict[bytes, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
@@ -136,7 +135,6 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
-        _TABLES.move_to_end(key)
         return _TABLES[key]
     began = time.perf_counter()
     made = _tabulate(run, names, largest, within_reach=not only_skin)
@@ -144,9 +142,9 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     spent = time.perf_counter() - began
     run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
     run.elsewhere_s += spent
+    if len(_TABLES) == _MOST_TABLES:
+        del _TABLES[next(iter(_TABLES))]
     _TABLES[key] = made
-    if len(_TABLES) > _MOST_TABLES:
-        _TABLES.popitem(last=False)
     return made
 
 

@@ -37,7 +37,7 @@ class TangentialResponse:
     def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
         """Return the (2, nx, ns) displacement [mm] under a traction of the size of the contact pressure.
 
-        `touched` (nx, ns) is the whole contact; `state` may hold the pressure of its inner part alone.
+        `touched` (nx, ns) is the whole contact; `state` may hold only the pressure of its inner part.
         """
         if not state.force_n > 0:
             return np.zeros((2, *touched.shape))

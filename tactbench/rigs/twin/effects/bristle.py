@@ -31,18 +31,10 @@ def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s:
 
 
 def bristle(t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float) -> FloatArray:
-    """Return the (n,) deflection of the bristle at a constant speed.
+    """Return the (n,) deflection of the bristle at (n,) ascending times and a constant speed, from `start_mm` on.
 
-    Parameters
-    ----------
-    t_s
-        (n,) ascending; equal neighbours change nothing.
-    speed_mm_s
-        Held throughout; 0 leaves the deflection as it is.
-    limit_mm
-        (n,) deflection of steady sliding ``g``, at least 0, held from each sample to the next. 0: nothing is held.
-    start_mm
-        Deflection at the first sample.
+    A speed of 0 and equal neighbouring times change nothing. `limit_mm` (n,) is the deflection of steady sliding ``g``,
+    at least 0, held from each sample to the next; where it is 0 nothing is held.
     """
     way = abs(speed_mm_s) * np.diff(t_s, prepend=t_s[:1])
     held = np.concatenate([limit_mm[:1], limit_mm[:-1]])

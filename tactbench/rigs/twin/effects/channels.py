@@ -94,17 +94,17 @@ def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nui
     white ``e`` and ``g`` and the projection P on the r-dimensional space of quadratics of mean 0 over the places, whose
     ``P g`` has the mean square r / n. No quadratic is preferred, whatever axes the places are written in.
     """
-    alone = run.of_every_channel(track, kind, run.of_recording("offset", "own", kind))
+    white = run.of_every_channel(track, kind, run.of_recording("offset", "own", kind))
     share = 0.0 if nuisances.offset_smooth is None else nuisances.offset_smooth.to("1")
     basis = smooth_basis(run.sensor.spec, kind) if share else None
     if basis is None or not basis.size:
-        return alone
+        return white
     channels, dimensions = basis.shape
-    white = run.of_recording("offset", "smooth", kind).standard_normal(channels)
-    field = math.sqrt(share * channels / dimensions) * (basis @ (basis.T @ white))
+    smooth = run.of_recording("offset", "smooth", kind).standard_normal(channels)
+    field = math.sqrt(share * channels / dimensions) * (basis @ (basis.T @ smooth))
     names = [channel.name for channel in run.sensor.spec.channels(kind)]
     recorded = [names.index(channel.name) for channel in track.channels if channel.kind == kind]
-    return np.asarray(math.sqrt(1.0 - share) * alone + field[recorded])
+    return np.asarray(math.sqrt(1.0 - share) * white + field[recorded])
 
 
 def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:

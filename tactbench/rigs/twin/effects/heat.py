@@ -80,8 +80,9 @@ def thermal_drift(run: Synthesis) -> None:
     for track in run.tracks:
         if track.warmth_k is None:
             continue
-        alone = core.untouched(run.scene, track.t_s)
-        gained = relative_conductivity(alone + track.warmth_k, per_k) / relative_conductivity(alone, per_k)
+        untouched = core.untouched(run.scene, track.t_s)
+        gained = relative_conductivity(untouched + track.warmth_k, per_k)
+        gained = gained / relative_conductivity(untouched, per_k)
         for column in track.by_kind().get("taxel", []):
             upper = track.channels[column].upper
             if upper is not None:

@@ -66,18 +66,11 @@ class HeatedCore:
     def warmth(self, scene: Scene, t_s: FloatArray, conductance_w_per_k: FloatArray, indenter_c: float) -> FloatArray:
         """Return the (n,) kelvin by which a contact warms the core: its temperature less that without a contact.
 
-        Parameters
-        ----------
-        t_s
-            (n,) ascending; equal neighbours are allowed.
-        conductance_w_per_k
-            (n,) heat flow per temperature difference through the contact.
-        indenter_c
-            Temperature of the indenter, degC.
+        `t_s` (n,) ascends, equal neighbours are allowed; `conductance_w_per_k` (n,) is that of the contact.
         """
         start = float(self.untouched(scene, t_s[:1])[0])
-        alone = self.carried(t_s, np.zeros_like(t_s), indenter_c, start)
-        return self.carried(t_s, conductance_w_per_k, indenter_c, start) - alone
+        untouched = self.carried(t_s, np.zeros_like(t_s), indenter_c, start)
+        return self.carried(t_s, conductance_w_per_k, indenter_c, start) - untouched
 
     def carried(
         self, t_s: FloatArray, conductance_w_per_k: FloatArray, indenter_c: float, start_c: float

@@ -38,17 +38,9 @@ Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
     """Return ``x_n = decay_n x_{n-1} + drive_n`` for all n, with ``x_0 = drive_0``.
 
-    Parameters
-    ----------
-    decay
-        (n,) of absolute value 0 to 1; the first is not used.
-    drive
-        (n,) or (n, channels)
-
-    Notes
-    -----
-    Solved by doubling: after step j every entry holds the sum over its last 2^j predecessors, so that 5000 samples
-    take 13 vector operations. Products of factors up to one cannot overflow.
+    `decay` (n,) is of absolute value 0 to 1, its first entry is not used; `drive` is (n,) or (n, channels). Solved by
+    doubling: after step j every entry holds the sum over its last 2^j predecessors, so that 5000 samples take 13 vector
+    operations. Products of factors up to one cannot overflow.
     """
     x = drive.copy()
     factor = decay.reshape(-1, *([1] * (drive.ndim - 1))).copy()
@@ -61,24 +53,10 @@ def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
 
 
 def lag(t_s: FloatArray, load: FloatArray, tau_s: float) -> FloatArray:
-    """Return the first-order lag of a load that is straight between samples, starting in equilibrium.
+    """Return the first-order lag of a (n,) load that is straight between samples, starting in equilibrium.
 
-    Parameters
-    ----------
-    t_s
-        (n,) ascending; equal neighbours are allowed.
-    load
-        (n,)
-    tau_s
-        Time constant, above zero.
+    Times ascend; equal neighbours are allowed. Raises as :func:`steps_s`.
 
-    Raises
-    ------
-    RigError
-        As :func:`steps_s`.
-
-    Notes
-    -----
     ``z' = a z + (1-a) x_n + (x_{n+1} - x_n) (1 - (tau/dt) (1-a))``, the exact answer to a straight input.
     """
     e = steps_s(t_s, tau_s) / tau_s

@@ -110,19 +110,9 @@ def slip_s(mode: Mode, u: float, speed: float) -> float:
 def shaken(t_s: FloatArray, pushed: FloatArray, mode: Mode) -> FloatArray:
     """Return (n,) the answer of ``q'' + 2 z w q' + w^2 q = w^2 u``, at rest in equilibrium at the first sample.
 
-    Parameters
-    ----------
-    t_s
-        (n,) ascending; equal neighbours change nothing.
-    pushed
-        (n,) u: where a slow push would bring it; straight between samples.
-    mode
-        The mode.
-
-    Notes
-    -----
-    With ``l = -z w + i wd`` and ``p = q' - conj(l) q`` it is one complex lag, ``p' = l p + w^2 u``, and
-    ``q = Im p / wd``: exact like the lag of ``memory``, and solved as quickly.
+    `t_s` (n,) ascends; equal neighbours change nothing. u is `pushed` (n,), the displacement under a slow push,
+    straight between samples. With ``l = -z w + i wd`` and ``p = q' - conj(l) q`` it is one complex lag, ``p' = l p +
+    w^2 u``, and ``q = Im p / wd``: exact like the lag of ``memory``, and solved as quickly.
     """
     root = complex(-mode.decay, mode.swing)
     dt = np.diff(t_s, prepend=t_s[:1])

@@ -28,7 +28,7 @@ def apply(run: Synthesis) -> None:
 
     The indenter is held where it stood when the slip began, so that the profile passing under the contact moves the
     skin, through its mode, and with it the normal force that is measured. The tangential motion of stick-slip (which
-    has swung in that mode already) lifts the skin in proportion: dynamic pressure alone shows it, because the
+    has swung in that mode already) lifts the skin in proportion: only dynamic pressure shows it, because the
     proportion is known for a motion and not for a place.
     """
     slide = run.scene.slide
@@ -51,7 +51,7 @@ def apply(run: Synthesis) -> None:
         track.vibration_mm = rough(track.t_s, track.force_n, seen.slip_mm)
         if "ac_pressure" in kinds:
             run.drawn["remark vibration"] = (
-                "above 100 Hz ac_pressure shows stick-slip and noise alone: a steady slide is as quiet as rest"
+                "above 100 Hz ac_pressure shows only stick-slip and noise: a steady slide is as quiet as rest"
             )
             track.vibration_mm += np.where(track.force_n > 0, lift * seen.displacement_mm, 0.0)
     force_n = run.load.at(run.t_s)
@@ -64,14 +64,7 @@ class Profile:
 
     Its spectrum over the wave number k is even up to the roll-off and falls as ``k^-(1 + 2 H)`` beyond (Persson et al.
     2005, J. Phys.: Condens. Matter 17 R1). Of each of equal steps in ln k one cosine, anywhere within it, has the
-    step's share of the variance; phases are uniform.
-
-    Parameters
-    ----------
-    surface
-        Roughness (root mean square), roll-off wavelength and Hurst exponent H.
-    generator
-        Where wavelengths and phases come from.
+    step's share of the variance; wavelengths and phases are drawn from `generator`, uniformly.
     """
 
     def __init__(self, surface: Surface, generator: np.random.Generator) -> None:

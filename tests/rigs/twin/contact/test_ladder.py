@@ -49,7 +49,7 @@ def test_springs_obey_the_law_of_a_thin_layer():
 
 
 def test_springs_refuse_what_they_are_wrong_for(specs):
-    with pytest.raises(RigError, match="over a fluid") as refused:
+    with pytest.raises(RigError, match="fluid") as refused:
         local(specs["biotac"].skin)
     assert "default" in refused.value.hint
     with pytest.raises(RigError, match=r"0\.45"):
@@ -83,6 +83,6 @@ def test_the_estimate_covers_the_true_error(sensors):
 
 
 def test_a_tolerance_nobody_can_keep_is_refused_with_the_best_there_is(sensors):
-    with pytest.raises(RigError, match="finest is off by about") as refused:
+    with pytest.raises(RigError, match="1e-09") as refused:
         _recorded(sensors["icub"], Simulation(tolerance=1e-9))
     assert "larger tolerance" in refused.value.hint

@@ -54,9 +54,3 @@ def test_whatever_moves_the_force_comes_before_what_reads_it(specs):
         names = [effect.name for effect in plan_scene(effects, scene, specs["icub"]).stages]
         assert [name for name in names if name.startswith("force-")] == ["force-loop", "force-noise", "force-filter"]
         assert names.index("contact") < names.index("creep") < names.index("transduction") < names.index("converter")
-
-
-def test_it_begins_settled(sensors):
-    _, raw, _ = _force(sensors, None, 0.5)
-    _, filtered, _ = _force(sensors, 1.0, 0.5)
-    assert filtered[0] == raw[0]

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
@@ -33,6 +33,7 @@ stribeck_speeds = st.one_of(st.just(0.0), st.floats(0.1, 50.0))
 @example([1.0, 0.0, 1.0, 0.0], 1.0, 0.5, 0.75, 0.0, 1.0)
 @example([0.0, 1.0], 23.0, 0.5, 5e-324, 0.0, 1.0)
 @example([1.0, 0.0], 1.0, 0.0, 0.8, 0.0, 0.5)
+@settings(max_examples=40)
 def test_whatever_moves_the_laws_of_friction_hold(load, speed, damping, kinetic, stribeck, end):
     drive = _drive(load, 1.0, speed_mm_s=speed, end_s=end, kinetic=kinetic, stribeck_mm_s=stribeck,
                    start_s=0.2, mode=Mode(2000.0, damping))  # fmt: skip
