@@ -30,7 +30,7 @@ from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig import RigDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget, in_drawn_order
+from tactbench.core.spec.task import ChannelTarget, TaskSpec, in_drawn_order
 
 if TYPE_CHECKING:
     from tactbench.core.recording.datasets import DataSet
@@ -207,20 +207,18 @@ def plan_run(
 def _unanswerable(
     key: RequestKey, registry: Registry, rig: RigDescriptor, file: RigFile | None
 ) -> NotApplicable | None:
-    """Return why a rig of real devices and a sensor cannot answer a task, by what their specs state; None: they may."""
+    """Return the reason for which specs rule out a task on a rig of real devices with a sensor, or None."""
     spec, task = registry.sensors[key[0]].spec, registry.tasks[key[1]].spec
-    if rig.simulated or rig.references is None:  # a simulated rig says so itself, and nobody presses for it
+    if rig.simulated or rig.references is None:  # a simulated rig raises it itself, at no cost
         return None
     kinds = {channel.kind for channel in spec.channels()}
     if not kinds & {*task.features, *task.optional_features}:
         needed = " or ".join(task.features)
         return NotApplicable(f"Task {task.name!r} needs channels of kind {needed}; {spec.name} has none.", hint="")
-    wanted: list[tuple[str, str | None]] = []
+    parts = getattr(task.target, "components", (task.target,))
+    wanted = [(one.kind, one.name) for one in parts if isinstance(one, ChannelTarget)]
     if isinstance(task.target, SlipTarget):
         wanted = [("position", "slip")]
-    elif not isinstance(task.target, LabelTarget):
-        parts = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
-        wanted = [(one.kind, one.name) for one in parts]
     for kind, name in wanted:
         names = rig.references.get(kind)
         lacking = names is None or (kind in ("force", "torque") and file is not None and file.force is None)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import ALIKE, Cell
+from tactbench.core.matrix.store.index import signature
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance.gather import host_id
@@ -70,8 +71,7 @@ def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplet
     """Return the dataset of a task from `recordings`; the last one is kept for the next cell."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    states = [(one.st_ino, one.st_mtime_ns, one.st_size) for one in map(os.stat, filter(os.path.exists, recordings))]
-    wanted = [task, recordings, states, include_incomplete]
+    wanted = [task, recordings, list(map(signature, recordings)), include_incomplete]
     if _last[:4] != wanted:
         _last[:] = [*wanted, load_dataset(task, recordings, include_incomplete=include_incomplete)]
     found: Dataset = _last[4]
@@ -202,12 +202,11 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
     """Return the assumptions of simulated recordings; where they differ, the range or all values."""
     found: dict[str, Scalar] = {}
     for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
-        values = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
-        numbers = [value for value in values if isinstance(value, int | float)]
+        values: list[Any] = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
         if len(values) == 1:
             found[name] = values[0]
-        elif len(numbers) == len(values):
-            found[name] = f"{min(numbers):g} to {max(numbers):g}"
+        elif all(isinstance(value, int | float) for value in values):
+            found[name] = f"{min(values):g} to {max(values):g}"
         else:
-            found[name] = ", ".join(str(value) for value in values)
+            found[name] = ", ".join(map(str, values))
     return found

@@ -167,7 +167,7 @@ def test_without_a_usable_index_the_rows_are_the_same(tmp_path, what):
     INDEXES[what](tmp_path / "results.sqlite", tmp_path)
     found = Store(tmp_path)
     assert json.dumps(found.rows()) == json.dumps(before), "tables are the same to the byte"
-    assert found.troubles == ()
+    assert found.troubles == []
     assert found.finished(key("a")) == before[0]
     assert found.provenance(before[0]["made_by"]) == {"cpu": "a"}
 
