@@ -88,22 +88,21 @@ class Keys:
         sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
         if rig_file is not None and not rig_file.emulated:
             return sections
-        owner, carrier, shape = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig), scene.indenter.shape
-        modules = [owner.module, carrier.module, carrier.descriptor.where]
-        modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
-        modules += [] if rig_file is None else self._behind(rig_file)
-        for effect in taking_part(self.registry, owner.descriptor, scene):
+        registry, shape = self.registry, scene.indenter.shape
+        owner, carriers = registry.sensors.owned(sensor), [registry.rigs.owned(rig)]
+        modules = [owner.module, owner.descriptor.transducer, owner.descriptor.driver]
+        if rig_file is not None:
+            names = [entry.device for entry in (rig_file.force, *rig_file.devices.values()) if entry is not None]
+            modules += [registry.devices.owned(name).module for name in names]
+            carriers.append(registry.rigs.owned(rig_file.emulation.physics))
+        for effect in taking_part(registry, owner.descriptor, scene):
             modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-        if shape is not None and shape in self.registry.indenters:  # the rig refuses an unknown one
-            indenter = self.registry.indenters.owned(shape)
+        for one in carriers:
+            modules += [one.module, one.descriptor.where]
+        if shape is not None and shape in registry.indenters:  # the rig refuses an unknown one
+            indenter = registry.indenters.owned(shape)
             modules += [indenter.module, indenter.descriptor.where]
-        return sections | {"versions": versions(), "source": sources_of(modules, RECORDING)}
-
-    def _behind(self, devices: RigFile) -> list[str]:
-        """Return the modules of a rig file's devices, and of the simulation behind the emulated ones."""
-        names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
-        physics = self.registry.rigs.owned(devices.emulation.physics)
-        return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
+        return sections | {"versions": versions(), "source": sources_of(filter(None, modules), RECORDING)}
 
 
 def differences(

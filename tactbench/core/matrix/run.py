@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,12 +23,12 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.record import GRACE_S, Recorder, foreign_components, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator, RecordingRequest
-from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.registry import Family, Registry, installed
+from tactbench.core.plugins.rigs import rig_of, taking_part
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
 from tactbench.core.progress import Progress
 from tactbench.core.provenance.gather import gather, usable_cores
@@ -36,6 +37,8 @@ from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec
 
 EngineName = Literal["in-process", "isolated", "dask"]
+GRACE_S = 5.0
+"""Seconds for a real rig to stop and close its devices after a timeout."""
 
 
 @dataclass(frozen=True)
@@ -312,3 +315,37 @@ class Run:
         row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
         self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {})
         self.computed += 1
+
+
+class Recorder:
+    """Makes recordings one after the other; their rig, from `registry`, is built once."""
+
+    def __init__(self, registry: Registry, operator: Operator | None) -> None:
+        self._operator = operator
+        self._built: Any = None
+        self._registry = replace(registry, tasks=Family("task"))  # tasks would be most of the pickled data
+
+    def __call__(self, request: RecordingRequest) -> None:
+        """Make a recording; raises whatever the rig raises."""
+        from tactbench.core.acquisition import acquire
+
+        if self._built is None:
+            self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
+        # The cost of a simulation is processor time, since several run at once; that of a real rig is wall time.
+        acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
+
+
+def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
+    """Return the names of effects and of an indenter of other packages that making a recording may import."""
+    effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
+    shape = str(request.scene.indenter.shape)
+    foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
+    return (*(one.descriptor.name for one in effects if not one.ours), *foreign)
+
+
+def is_computed(request: RecordingRequest) -> bool:
+    """Return whether a recording is computed on this machine, without real devices and wall-clock time."""
+    simulated, devices = request.rig.simulated, request.rig_file
+    if simulated or devices is None:
+        return simulated
+    return devices.emulation.time == "virtual" and all(entry.emulated for entry in devices.entries().values())

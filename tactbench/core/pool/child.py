@@ -12,16 +12,44 @@ import threading
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
+import psutil
+
 from tactbench.core import errors
 from tactbench.core.errors import OutOfMemory, Raised, TactbenchError, error_text
-from tactbench.core.pool.limits import Limits, resident_mb
 
 LOG_BYTES = 2**16
 """Length of the end of a log that is kept."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one item, a cell or a recording; None means no limit."""
+
+    timeout_s: float | None = None
+    """Seconds of wall time."""
+    memory_mb: int | None = None
+    """MB (2**20 bytes) beyond what its process holds when the item begins."""
+    grace_s: float = 0.0
+    """Seconds between SIGTERM and SIGKILL, so that a rig can close its devices."""
+
+
+UNLIMITED = Limits()
+
+
+def resident_mb(pid: int) -> float:
+    """Return the resident memory of a process and its descendants, MB; 0 once it has ended."""
+    total = 0
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for one in (process, *process.children(recursive=True)):
+            with suppress(psutil.Error):
+                total += one.memory_info().rss
+    return total / 2**20
 
 
 def run_child(

@@ -20,8 +20,7 @@ import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
 from tactbench.core.interrupts import interrupts_held
-from tactbench.core.pool.child import end_of, plain_error, run_child
-from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
+from tactbench.core.pool.child import UNLIMITED, Limits, end_of, plain_error, resident_mb, run_child
 
 START_S = 60.0
 """Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""

@@ -48,5 +48,5 @@ def test_probes_keep_apart_what_the_cell_keeps_apart(registry, asked, probes):
 
 
 def test_a_split_in_time_alone_cannot_be_probed(registry):
-    with pytest.raises(UsageError, match="nothing to probe"):
+    with pytest.raises(UsageError, match="probe"):
         plan(registry, protocol="deployable", split="in-session")

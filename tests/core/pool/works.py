@@ -81,7 +81,7 @@ def eats():
 
 def hangs(begun=None):
     """Wait for ever; tell in a file who does."""
-    print("about to hang", flush=True)
+    print("hanging", flush=True)
     if begun is not None:
         aside = Path(f"{begun}.aside")
         aside.write_text(str(os.getpid()))
@@ -90,9 +90,9 @@ def hangs(begun=None):
 
 
 def prints():
-    print("from Python")
-    os.write(1, b"from below\n")
-    os.system("echo from a child")
+    print("Python")
+    os.write(1, b"below\n")
+    os.system("echo child")
     raise ValueError("printed")
 
 
