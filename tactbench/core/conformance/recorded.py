@@ -23,11 +23,14 @@ from tactbench.core.conformance.streams import (
 )
 from tactbench.core.recording.datasets import DataSet, copy_in
 from tactbench.core.recording.mapping import model
+from tactbench.core.recording.mapping.channels import sensor_of
 from tactbench.core.recording.mapping.importing import import_tables
+from tactbench.core.recording.mapping.tasks import require_answerable
 from tactbench.core.samples import StreamData
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
+from tactbench.core.spec.task import TaskSpec
 
 LARGEST_N, MOST_N = 1000.0, 100.0  # largest and median force: a press of 10 N in gram-force reads 1020
 LOADED = 0.2  # share of the largest force from which a sample counts as loaded
@@ -124,22 +127,17 @@ def tasks_can_be_answered(subject: Subject) -> None:
     and features. A session is what was recorded without mounting anew, and holds several trials.
     """
     mapping = _mapping(subject)
-    streams = mapping.streams.values()
-    sensed = {channel.kind for one in streams if one.of == "sensor" for channel in one.channels}
-    known = {channel.kind for one in streams if one.of == "reference" for channel in one.channels}
-    labels = {*mapping.recording.labels, *(label for one in streams for label in one.annotations)}
+    sensed = {one.kind for stream in mapping.streams.values() if stream.of == "sensor" for one in stream.channels}
     own = {one.name for one in mapping.tasks}  # the import checks these
-    for name in () if mapping.source is None else set(mapping.source.tasks) - own:
-        with code_of("source.tasks", subject):
+    with code_of("source.tasks", subject):
+        for name in () if mapping.source is None else set(mapping.source.tasks) - own:
             spec: TaskSpec = subject.registry.tasks[name].spec
-        target = spec.target
-        there: set[str] = {*known, *(sensed if isinstance(target, VectorTarget) else ())}
-        asked = getattr(target, "kind", None)
-        if isinstance(target, LabelTarget):
-            asked, there = target.name, labels
-        if not sensed & {*spec.features, *spec.optional_features} or (asked is not None and asked not in there):
-            text = f"{name} predicts {asked} from {' or '.join(spec.features)}"
-            fail("source.tasks", f"{text}; there is {', '.join(sorted(there)) or 'none'} beside {', '.join(sensed)}")
+            if isinstance(spec.target, SlipTarget):
+                continue
+            features = tuple(sensed.intersection({*spec.features, *spec.optional_features})) or spec.features
+            task = spec.model_copy(update={"features": features, "splits": ()})
+            path = Path(subject.module)
+            require_answerable(mapping.model_copy(update={"tasks": (task,)}), sensor_of(mapping)[2], path)
     names = mapping.recording.session, mapping.recording.trial
     session, trial = (set(re.findall(r"\{(\w+)", name)) for name in names)
     if trial and trial <= session:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
+from typing import Any
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
     sensor_spec,
@@ -33,7 +33,6 @@ from tactbench.core.conformance.check import (
 )
 from tactbench.core.errors import TimedOut, UnknownNameError, error_text
 from tactbench.core.on_demand import contributed
-from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.recording.datasets import mapping_called, mappings_of
@@ -131,12 +130,9 @@ def run_checks(
     subject: Subject,
     *,
     modes: Sequence[Mode] = ("passive",),
-    recording: Path | None = None,
-    rig_file: Path | None = None,
-    operator: Operator | None = None,
-    root: Path | None = None,
     isolated: bool = True,
     without: Collection[str] = (),
+    **fields: Any,
 ) -> CheckReport:
     """Run the checks of one plugin, each within limits.
 
@@ -144,15 +140,15 @@ def run_checks(
     ----------
     modes
         Modes of the checks. In the mode `recording` the plugin's code is not imported.
-    recording, rig_file, operator, root
-        As :class:`Subject` has them.
     isolated
         Whether in a child process. Checks of the mode `invasive` are always run in this process, without a time limit:
         an interrupt must reach the rig.
     without
         Names of checks that are left out.
+    fields
+        Values of the subject's fields `recording`, `rig_file`, `operator` and `root`.
     """
-    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator, root=root)
+    subject = replace(subject, **fields)
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:

@@ -195,13 +195,12 @@ def its_scene_is_carried_out(subject: Subject) -> None:
     spec = subject.spec
     if not spec.scenes:
         skip(NO_SCENES)
-    scene = spec.scenes[0].scene
-    slide = scene.slide
-    if slide is not None:
-        slide = slide.model_copy(update={"start": assumed(SECONDS / 2, "s", WHY), "duration": None})
-    kept = {field: getattr(scene, field) for field in
-            ("indenter", "placement", "observe", "labels", "drive", "simulation")}  # fmt: skip
-    press = first_press(subject, tiny_scene(slide=slide, **kept), f"spec.scenes[{scene.name}]")
+    scene, tiny = spec.scenes[0].scene, tiny_scene()
+    slide = scene.slide and scene.slide.model_copy(
+        update={"start": assumed(SECONDS / 2, "s", WHY), "duration": None}
+    )  # fmt: skip
+    kept = {"profile": tiny.profile, "environment": tiny.environment, "slide": slide}
+    press = first_press(subject, scene.model_copy(update=kept), f"spec.scenes[{scene.name}]")
     recorded = [(channel.kind, channel.name) for stream in press.meta.reference for channel in stream.channels]
     for one in getattr(spec.target, "components", (spec.target,)):
         if isinstance(one, ChannelTarget) and not any(one.kind == k and one.name in (None, n) for k, n in recorded):

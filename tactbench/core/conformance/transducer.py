@@ -79,18 +79,17 @@ def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged
     apart = np.stack(np.meshgrid(grid.x_mm - at_mm[0], grid.s_mm - at_mm[1], indexing="ij")) / sigma
     bell = np.exp(-(apart**2).sum(axis=0) / 2)
     pressure = force_n / (2 * math.pi * sigma**2) * bell
-    if isinstance(skin, FluidBackedShell):
+    fluid, rest = isinstance(skin, FluidBackedShell), np.ones(bell.shape)
+    if fluid:
         radius_mm = math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
-        rest, least = skin.film.at(grid.x_mm, grid.s_mm / radius_mm), skin.residual_film.to("mm")
-        fluid_mpa = 0.001 * force_n
+        rest = skin.film.at(grid.x_mm, grid.s_mm / radius_mm)
     else:
-        rest, least, fluid_mpa = np.full(bell.shape, skin.thickness.to("mm")), 0.0, 0.0
+        rest *= skin.thickness.to("mm")
     deflection = min(force_n / 3, 0.9) * bell * rest
     way, sheared = np.array(dragged)[:, None, None], bool(subject.spec.reads_shear)
     return SkinState(
         grid=grid, force_n=force_n, deflection_mm=deflection, pressure_mpa=pressure,
-        thickness_mm=np.maximum(rest - deflection, least), depth_mm=float(deflection.max()),
-        fluid_pressure_mpa=fluid_mpa,
+        thickness_mm=rest - deflection, depth_mm=float(deflection.max()), fluid_pressure_mpa=0.001 * force_n * fluid,
         contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0, residual=0.0,
         tangential_displacement_mm=(apart + way) * deflection / 3 if sheared else None,
         shear_mpa=way * pressure if sheared else None,

@@ -88,7 +88,6 @@ class Outcome:
     """Result of a run."""
 
     rows: tuple[Row, ...]
-    provenance: dict[str, Any]
     computed: int
     """Number of cells computed in this run; the others were reused."""
     recorded: int
@@ -148,13 +147,11 @@ def run_matrix(
         registry = with_declared(installed(), declared)
         keys = Keys(registry)
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
-        provenance = gather(registry, seed=matrix.seed, engine=choice.name)
-        store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress, cells)
+        store.begin(gather(registry, seed=matrix.seed, engine=choice.name))
+        run = Run(store, registry, keys, plan, choice, operator, progress)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
-    rows = tuple(run.rows[cell.name] for cell in cells)
-    return Outcome(rows, provenance, run.computed, run.recorded)
+    return Outcome(tuple(run.rows[cell.name] for cell in cells), run.computed, run.recorded)
 
 
 @dataclass
@@ -168,7 +165,6 @@ class Run:
     choice: EngineChoice
     operator: Operator | None
     progress: Progress
-    cells: Sequence[Cell]
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
     recorded: int = 0

@@ -68,7 +68,7 @@ class StoredCell:
                 requests = requests_for([self.cell], self.registry, keys, again)[need]
                 source = RecordingSource([request.path for request in requests], requests)
             choice = EngineChoice("in-process")
-            run = Run(again, self.registry, keys, {need: source}, choice, None, progress, [self.cell])
+            run = Run(again, self.registry, keys, {need: source}, choice, None, progress)
             run.carry_out([self.cell], alone=True)
             row = run.rows[self.cell.name]
             done = row["status"] == self.row["status"] == "done"

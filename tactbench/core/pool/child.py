@@ -43,13 +43,13 @@ UNLIMITED = Limits()
 
 def resident_mb(pid: int) -> float:
     """Return the resident memory of a process and its descendants, MB; 0 once it has ended."""
-    total = 0
+    found = list[int]()
     with suppress(psutil.Error):
         process = psutil.Process(pid)
         for one in (process, *process.children(recursive=True)):
             with suppress(psutil.Error):
-                total += one.memory_info().rss
-    return total / 2**20
+                found.append(one.memory_info().rss)
+    return sum(found) / 2**20
 
 
 def run_child(
@@ -80,7 +80,7 @@ def run_child(
     os.chdir(folder)
     me = os.getpid()
     for item in items:
-        os.ftruncate(1, 0)  # of what is printed, only that of one item is kept
+        os.ftruncate(printed, 0)  # of what is printed, only that of one item is kept
         connection.send(("begun", resident_mb(me), ""))
         kind, value = _carry_out(work, item, limits)
         if os.getpid() != me:
@@ -141,12 +141,10 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
 
 def _end_with_parent() -> None:
     """End this process and its group when the parent has ended, however that happened."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        if hasattr(os, "killpg"):
-            os.killpg(0, signal.SIGKILL)
-        os._exit(1)
+    multiprocessing.parent_process().join()  # type: ignore[union-attr]
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)
 
 
 def plain_error(error: BaseException) -> TactbenchError:

@@ -102,8 +102,9 @@ def floods():
 
 
 def feeds_a_child():
-    """Have a process of its own take memory, which no limit of this process can refuse."""
-    subprocess.run([sys.executable, "-c", "import threading; a = bytearray(200 * 2**20); threading.Event().wait()"])
+    """Have a process below one of its own take 100 MB, which no limit of this process can refuse."""
+    code = "import threading; a = bytearray(100 * 2**20); threading.Event().wait()"
+    subprocess.run(f"{sys.executable} -c '{code}'; true", shell=True)
 
 
 def forks():
