@@ -37,11 +37,13 @@ from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N, REAL_N, EFFECT_N = 0.5, 1.0, 2.0  # every sensor bears the first; motors follow the second; effects need load
 TASK_N = 5.0  # the range of our tasks of force
-NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws can be told apart
+NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws differ visibly
 SECONDS, LATE = 1.0, 0.5  # duration of a press; share by which a rig that begins later may deviate from it
 LEAST_RISE = 0.02  # of its whole change, in the upper part of a channel's range (assumed: foams harden)
 ALWAYS_WANTED = ("stored", "reference-force")  # tokens that every recording needs, beside the kinds of channels
-READINGS = frozenset((*get_args(ChannelKind), "disturbance", "reading", "stored"))  # tokens that mean readings alone
+READINGS = frozenset(
+    (*get_args(ChannelKind), "disturbance", "reading", "stored")
+)  # tokens of effects that change only readings
 REACH_MM, FLAT = 15.0, 2e-3  # half-width of the examined square; share of its largest dimension by which a body rises
 LOWEST_MM = 1e-9  # rounding of the lowest point, which is at 0
 CALLS = 8  # calls of `called_for` for one scene: a random answer then shows
@@ -175,8 +177,8 @@ def _full_scene(sensors: Sequence[SensorDescriptor]) -> Scene:
 def effect_takes_part(subject: Subject) -> None:
     """A plan takes effects by the tokens that they produce and consume, and by what called_for answers.
 
-    Produce what an effect or channel needs, and consume what an effect produces; compute the Reason from the scene and
-    the sensor alone.
+    Produce what an effect or channel needs, and consume what an effect produces; compute the Reason only from the
+    scene and the sensor.
     """
     effects, produced = subject.registry.effects, subject.descriptor.produces
     wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *(token for one in effects for token in one.consumes)}
@@ -249,7 +251,7 @@ def it_is_applied(subject: Subject) -> None:
 
 @check("indenter", needs="code-names-resolve")
 def indenter_is_pressed(subject: Subject) -> None:
-    """A height is asked for at all places at once and counted from the lowest point, which touches first.
+    """Heights are computed at all places at once and counted from the lowest point, which touches first.
 
     Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
     body is; choose defaults with flanks of up to 45 degrees. Never change x_mm or y_mm.

@@ -93,7 +93,7 @@ class CheckReport:
 
 
 def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
-    """Return the descriptors called `name`, or else all that a plugin of that name brings.
+    """Return the descriptors called `name`, or else all descriptors of a plugin of that name.
 
     Raises
     ------
@@ -102,11 +102,11 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_
     """
     rows = plugins_named(registry, name)
     every = [(kind, one) for kind in kinds if kind != "dataset" for one in registry.families()[f"{kind}s"].all_owned()]
-    brought = {one for row in rows for one in row.brings}
+    offered = {one for row in rows for one in row.brings}
     mapping = mapping_called(name) if "dataset" in kinds else None
     files = [mapping] if mapping else [file for row in rows if not row.brings for file in mappings_of(row.module)]
     found = [(kind, one) for kind, one in every if one.descriptor.name == name] or [
-        (kind, one) for kind, one in every if f"{kind} {one.descriptor.name}" in brought
+        (kind, one) for kind, one in every if f"{kind} {one.descriptor.name}" in offered
     ]
     if not found and not files and not any(row.status == "failed" for row in rows):
         known = {one.descriptor.name for _, one in every} | {row.entry_point for row in registry.plugins}

@@ -62,7 +62,7 @@ def names_are_known(subject: Subject) -> None:
 
 @check("task")
 def metric_has_its_unit(subject: Subject) -> None:
-    """The unit stands beside every score: errors are computed in the target's unit, and nobody converts them.
+    """The unit stands beside every score: errors are computed in the target's unit, and are not converted.
 
     Name a metric of the task's kind; state the target's unit for errors (rmse, mae, mean_euclidean_error), else 1.
     """
@@ -106,7 +106,7 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
         taught = {planned.scene.labels[target.name] for planned in spec.scenes if planned.role == "train"}
         strange = {planned.scene.labels[target.name] for planned in spec.scenes} - taught
         if len(taught) == 1 or (spec.kind == "classification" and taught and strange):
-            text = f"role train teaches {', '.join(map(str, taught))} alone; other roles have"
+            text = f"role train teaches {', '.join(map(str, taught))} only; other roles have"
             fail("spec.scenes", f"{text} {', '.join(sorted(map(str, strange))) or 'the same'}")
         _label_is_one_thing(spec, target)
     if "roles" not in spec.splits:

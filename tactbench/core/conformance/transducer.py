@@ -72,7 +72,7 @@ def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged
 
     No equation is solved. The dent goes a third of the way through the skin at 1 N and further in proportion, never
     through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s: it moves the
-    dent by a third of that share of its depth, and the press alone moves the skin away from its middle by as much.
+    dent by a third of that share of its depth, and a press without it moves the skin away from its middle by as much.
     """
     skin, grid, at_mm = subject.spec.skin, skin_grid(subject.spec.skin.sheet), at_mm or _places(subject)[0]
     sigma = patch_mm(grid)
@@ -123,7 +123,7 @@ def _changes(subject: Subject, force_n: float = GENTLE_N) -> FloatArray:
 
 @check("sensor", needs="code-names-resolve limits-are-in-order")
 def transducer_reads(subject: Subject) -> None:
-    """The twin calls it with the spec, a grid of the skin and the channels that are asked for, from rest to overload.
+    """The twin calls it with the spec, a grid of the skin and the requested channels, from rest to overload.
 
     Return one finite number for each name in `channel_names`, as an array of shape (n,); guard divisions by force,
     pressure and contact radius, which are 0 at rest, and by a thickness that is used up. The arrays of a state are
@@ -155,7 +155,7 @@ def rest_is_as_stated(subject: Subject) -> None:
 
 @check("sensor", needs="transducer-reads")
 def transducer_has_no_memory(subject: Subject) -> None:
-    """The twin uses a state several times, asks for some of the channels in an order of its own, and adds the noise.
+    """The twin uses a state several times, requests some of the channels in an order of its own, and adds the noise.
 
     Keep nothing between two calls and draw nothing. Look channels up by the names in `channel_names`; never rely on
     their number or order.
@@ -169,7 +169,7 @@ def transducer_has_no_memory(subject: Subject) -> None:
         for name, value in zip(some, again, strict=True):
             if not math.isclose(value, before[name], rel_tol=rtol, abs_tol=atol):
                 text = f"{name} reads {before[name]:g}, and {value:g} in the same state"
-                fail("transducer", f"{text} or when asked in another order")
+                fail("transducer", f"{text} or another order of channels")
 
 
 @check("sensor", needs="transducer-reads")

@@ -139,7 +139,7 @@ def run_matrix(
     choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
     if choice.name == "dask":
-        matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
+        matrix = matrix.model_copy(update={"latency": False})  # other work may run beside a cell on a cluster
     with store.hold():
         preload("tactbench.core.matrix.preloaded")
         parts = parts_of(matrix, recordings, root, progress)
@@ -149,8 +149,8 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         store.begin(gather(registry, seed=matrix.seed, engine=choice.name))
         run = Run(store, registry, keys, plan, choice, operator, progress)
-        run.carry_out([cell for cell in cells if cell.timed], alone=True)
-        run.carry_out([cell for cell in cells if not cell.timed], alone=False)
+        for timed in (True, False):
+            run.carry_out([cell for cell in cells if cell.timed == timed], timed=timed)
     return Outcome(tuple(run.rows[cell.name] for cell in cells), run.computed, run.recorded)
 
 
@@ -169,8 +169,8 @@ class Run:
     computed: int = 0
     recorded: int = 0
 
-    def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
-        """Make the missing recordings of `cells`, then evaluate them; `alone`: one cell at a time."""
+    def carry_out(self, cells: Sequence[Cell], *, timed: bool) -> None:
+        """Make the missing recordings of `cells`, then evaluate them; timed ones are evaluated one at a time."""
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
@@ -178,8 +178,8 @@ class Run:
         groups = [jobs for need, some in by_need.items() if (jobs := self._jobs(self.plan[need], some))]
         if not groups:
             return
-        self.progress.begin("evaluating, timed" if alone else "evaluating", sum(map(len, groups)))
-        at_once = 1 if alone or self.choice.name == "in-process" else self.choice.processes
+        self.progress.begin("evaluating, timed" if timed else "evaluating", sum(map(len, groups)))
+        at_once = 1 if timed or self.choice.name == "in-process" else self.choice.processes
         with self.choice.engine(at_once) as engine:
             self._submit_cells(engine, groups, at_once)
             for job, outcome in engine.outcomes():

@@ -147,17 +147,14 @@ def check_content(job: Job) -> None:
 
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with every key of the format, filled with what is known before the evaluation."""
-    unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
     of_task = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
-        **unknown,
+        **dict(RowModel.model_construct(cell=cell.name, status="planned")),
         **{name: getattr(cell, name) for name in ALIKE},
         **{name: getattr(task, name) for name in of_task},
-        "cell": cell.name,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
         "simulation": cell.simulation.model_dump(mode="json", exclude_defaults=True),
-        "status": "planned",
         "simulated": simulated,
         **published(cell, task, cell.split),
     }

@@ -69,7 +69,7 @@ class StoredCell:
                 source = RecordingSource([request.path for request in requests], requests)
             choice = EngineChoice("in-process")
             run = Run(again, self.registry, keys, {need: source}, choice, None, progress)
-            run.carry_out([self.cell], alone=True)
+            run.carry_out([self.cell], timed=True)
             row = run.rows[self.cell.name]
             done = row["status"] == self.row["status"] == "done"
             old, new = (
@@ -102,7 +102,7 @@ def meant(given: str, names: Sequence[str]) -> str:
 
     ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
 
-    The replicates of a cell differ in the last part of their names alone: if all that fit are replicates of one cell,
+    The replicates of a cell differ only in the last part of their names: if all that fit are replicates of one cell,
     `given` stands for the first of them.
 
     Raises
