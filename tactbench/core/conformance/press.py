@@ -43,7 +43,7 @@ LEAST_RISE = 0.02  # of its whole change, in the upper part of a channel's range
 ALWAYS_WANTED = ("stored", "reference-force")  # tokens that every recording needs, beside the kinds of channels
 READINGS = frozenset(
     (*get_args(ChannelKind), "disturbance", "reading", "stored")
-)  # tokens of effects that change only readings
+)  # tokens that change only readings
 REACH_MM, FLAT = 15.0, 2e-3  # half-width of the examined square; share of its largest dimension by which a body rises
 LOWEST_MM = 1e-9  # rounding of the lowest point, which is at 0
 CALLS = 8  # calls of `called_for` for one scene: a random answer then shows

@@ -149,12 +149,13 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with every key of the format, filled with what is known before the evaluation."""
     of_task = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
-        **dict(RowModel.model_construct(cell=cell.name, status="planned")),
+        **dict(RowModel.model_construct(cell=cell.name, status="skipped")),
         **{name: getattr(cell, name) for name in ALIKE},
         **{name: getattr(task, name) for name in of_task},
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
         "simulation": cell.simulation.model_dump(mode="json", exclude_defaults=True),
+        "status": "planned",
         "simulated": simulated,
         **published(cell, task, cell.split),
     }
