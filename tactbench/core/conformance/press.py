@@ -41,9 +41,7 @@ NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws dif
 SECONDS, LATE = 1.0, 0.5  # duration of a press; share by which a rig that begins later may deviate from it
 LEAST_RISE = 0.02  # of its whole change, in the upper part of a channel's range (assumed: foams harden)
 ALWAYS_WANTED = ("stored", "reference-force")  # tokens that every recording needs, beside the kinds of channels
-READINGS = frozenset(
-    (*get_args(ChannelKind), "disturbance", "reading", "stored")
-)  # tokens that change only readings
+READINGS = frozenset((*get_args(ChannelKind), "disturbance", "reading", "stored"))  # tokens that change only readings
 REACH_MM, FLAT = 15.0, 2e-3  # half-width of the examined square; share of its largest dimension by which a body rises
 LOWEST_MM = 1e-9  # rounding of the lowest point, which is at 0
 CALLS = 8  # calls of `called_for` for one scene: a random answer then shows
