@@ -59,7 +59,7 @@ MISTAKES = [
     ("pad", "state.pressure_mpa, 2", "state.shear_mpa[0], 2", "transducer-reads", "line 18"),
     ("pad", "reads_shear=()", 'reads_shear=("taxel",)', "shear-turns-with-its-direction", "reads_shear"),
     ("pad", "return 100.0", "state.pressure_mpa[:] *= 2; return 100.0", "transducer-reads", "read-only"),
-    ("pad", "return 100.0", "return 100.0 + np.random.rand(len(stacked))", "transducer-reads", "t1"),
+    ("pad", "return 100.0", "return 100.0 + np.random.rand(len(stacked))", "transducer-reads", "again"),
     ("pad", "assumed(400,", "assumed(0.4,", "it-answers-to-a-press", "0.0279"),
     ("pad", "assumed(400,", "assumed(4e6,", "press-is-recorded", "force_range"),
     ("pad", "state.pressure_mpa, 2)", "state.pressure_mpa, 2) / (1 + 3 * state.force_n**2)",
