@@ -183,7 +183,8 @@ class Run:
         with self.choice.engine(at_once) as engine:
             self._submit_cells(engine, groups, at_once)
             for job, outcome in engine.outcomes():
-                self._evaluated(job, outcome, engine.log)
+                self._ended(job.cell, job.task, outcome, job.key, job.sections, engine.log)
+                self.progress.advance(job.cell.name, stopped=self.rows[job.cell.name]["status"] in STOPPED)
 
     # Recordings
 
@@ -203,15 +204,14 @@ class Run:
                 for request, outcome in recorder.outcomes():
                     self._recorded(request, outcome)
         finally:
-            self._clear(missing.values())  # of an interrupted run, too
+            self._clear(requests)  # of an interrupted run, too
 
-    def _clear(self, requests: Iterable[RecordingRequest]) -> None:
+    def _clear(self, requests: Sequence[RecordingRequest]) -> None:
         """Remove unfinished files of killed simulations; data of devices are never removed."""
-        by_path = {request.path: request for request in requests}
-        for folder in {path.parent for path in by_path}:
+        computed = {request.path.name for request in requests if is_computed(request)}
+        for folder in {request.path.parent for request in requests}:
             for left in folder.glob("*.h5.*"):
-                request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
-                if request is not None and is_computed(request):
+                if f"{left.name.partition('.h5.')[0]}.h5" in computed:
                     left.unlink(missing_ok=True)
 
     def _is_there(self, request: RecordingRequest) -> bool:
@@ -266,7 +266,7 @@ class Run:
                 digests = digests or {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
-                self._stopped(cell, task, error)
+                self._ended(cell, task, error)
                 continue
             found = self.store.finished(key)
             if found is None:
@@ -291,25 +291,16 @@ class Run:
             for piece in pieces.values():
                 engine.submit(work, piece)
 
-    def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
-        """Store the result or the error of a cell."""
-        cell = job.cell
+    def _ended(
+        self, cell: Cell, task: TaskSpec, outcome: Any, key: str = "", sections: Sections | None = None, log: str = ""
+    ) -> None:
+        """Store the result of a cell, or the error that stopped it."""
         if isinstance(outcome, BaseException):
-            self._stopped(cell, job.task, outcome, job.key, job.sections)
+            row, answers = unanswered(cell, task, outcome, simulated=self.registry.rigs[cell.rig].simulated), None
         else:
             row, answers = outcome
-            paths = [self.store.beside(Path(path)) for path in row["recordings"]]
-            self.rows[cell.name] = self.store.keep(
-                {**row, "key": job.key, "log": log, "recordings": paths}, job.sections, answers
-            )
-            self.computed += 1
-        self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-
-    def _stopped(
-        self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None
-    ) -> None:
-        row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
-        self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {})
+            row |= {"log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
+        self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {}, answers)
         self.computed += 1
 
 
