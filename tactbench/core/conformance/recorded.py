@@ -146,7 +146,7 @@ def tasks_can_be_answered(subject: Subject) -> None:
 
 @check("dataset", needs="tasks-can-be-answered")
 def readings_are_as_stated(subject: Subject) -> None:
-    """What a mapping states wrongly is stored, and believed by everybody who reads the recordings.
+    """A wrong statement of a mapping is stored with the recordings, and their readers rely on it.
 
     Look at columns, units (`given_in`), sentinels, `sign`, `lower`, `upper`, `rest` and `rate_hz` of the channels that
     are named, and at the unit of the time.

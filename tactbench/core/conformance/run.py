@@ -10,8 +10,7 @@ from functools import partial
 from typing import Any
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
-    sensor_spec,
-    transducer,
+    sensor,
     press,
     task,
     estimator,
@@ -69,7 +68,7 @@ class CheckReport:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing failed."""
+        """Whether no check failed."""
         return not self.failed
 
     @property
@@ -154,7 +153,7 @@ def run_checks(
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
-            if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
+            if isinstance(given, BaseException):  # it hung or crashed; the remaining checks run in another process
                 late = isinstance(given, TimedOut)
                 text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)

@@ -273,7 +273,7 @@ class Run:
                 estimator = self.registry.estimators[cell.estimator]
                 jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
-            # Its key covers neither its name nor what is published: they change no number.
+            # Its key covers neither its name nor published figures: they change no number.
             row = {**found, "cell": cell.name, **published(cell, task, found["split"])}
             self.store.reuse(row)
             self.rows[cell.name] = row

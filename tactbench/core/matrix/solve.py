@@ -108,7 +108,7 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
     from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 
     began = time.perf_counter()
-    # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
+    # The global generators get the cell's seed: their draws do not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = read_dataset(task, recordings, cell.include_incomplete)

@@ -72,7 +72,7 @@ def run_child(
     printed = _redirect(log)
     if hasattr(os, "setsid"):
         with suppress(OSError):
-            os.setsid()  # its process group, by which the parent ends it with what it has started
+            os.setsid()  # a process group, by which the parent ends it together with its own children
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _terminate)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -80,7 +80,7 @@ def run_child(
     os.chdir(folder)
     me = os.getpid()
     for item in items:
-        os.ftruncate(printed, 0)  # of what is printed, only that of one item is kept
+        os.ftruncate(printed, 0)  # the log holds the output of one item
         connection.send(("begun", resident_mb(me), ""))
         kind, value = _carry_out(work, item, limits)
         if os.getpid() != me:

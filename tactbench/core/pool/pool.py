@@ -187,7 +187,7 @@ class _Child:
                         continue
                     return _with_log(value, log, began_s)
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
-            except (EOFError, OSError):  # it has ended, or closed what is not its own
+            except (EOFError, OSError):  # it has ended, or closed the connection
                 self._process.join(1.0)
                 stopped = self._crashed()
             if stopped is not None:

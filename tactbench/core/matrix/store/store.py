@@ -107,7 +107,7 @@ class Store(Index):
             if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
                 self.superseded.append(cell.row["cell"])
             for name, _key, status in before:
-                if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
+                if status != "done" and name != path.name:  # superseded; finished ones stay for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._drop(name)
         self._put(path, cell)
@@ -121,7 +121,7 @@ class Store(Index):
         return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
-        """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""
+        """Return the answers of a finished cell by role; none for a cell that is missing or cannot be read."""
         path = self.folder / "cells" / f"{key}.h5"
         try:
             return dict(read_cell(path).answers) if path.is_file() else {}
