@@ -22,7 +22,7 @@ from tactbench.core.conformance.streams import (
     pressing_force,
     times_are_right,
 )
-from tactbench.core.errors import UsageError, nearest
+from tactbench.core.errors import UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.rigs import rig_context
@@ -70,10 +70,10 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
     """Return sensors that can be simulated: those of this package, the cheapest first, then the plugin's own."""
-    able = [(not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells), one.descriptor.name, one.descriptor)
-            for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
+    able = [one for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
             if one.descriptor.spec.skin is not None and one.descriptor.transducer is not None]  # fmt: skip
-    return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
+    able.sort(key=lambda one: (not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells)))  # type: ignore[union-attr]
+    return [one.descriptor for one in able]
 
 
 def first_press(subject: Subject, scene: Scene, field: str) -> Recorded:  # noqa: RET503  (`skip` returns nothing)
@@ -181,8 +181,7 @@ def effect_takes_part(subject: Subject) -> None:
     effects, produced = subject.registry.effects, subject.descriptor.produces
     wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *(token for one in effects for token in one.consumes)}
     if not wanted.intersection(produced):
-        close = nearest(produced[0], wanted) if produced else []
-        fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
+        fail(f"produces{list(produced)}", f"nothing needs it: needed are {', '.join(sorted(wanted))}")
     for unknown in set(subject.descriptor.consumes) - {token for one in effects for token in one.produces}:
         fail(f"consumes[{unknown}]", "no installed effect produces it")
     sensors = simulated_sensors(subject)
@@ -210,10 +209,8 @@ def it_is_applied(subject: Subject) -> None:
     divisions; draw from run.of_recording(…), run.of_session(…) or run.of_unit(…).
     """
     sensors, (rig, descriptor) = simulated_sensors(subject), simulated_rig(subject)
-    scene, consumed = _full_scene(sensors), set(subject.descriptor.consumes)
-    siblings = [one.descriptor for one in subject.registry.effects.all_owned()
-                if one.distribution == subject.distribution]  # fmt: skip
-    words = [one.name for one in siblings if consumed.intersection(one.produces)]
+    scene, every = _full_scene(sensors), subject.registry.effects.all_owned()
+    words = [one.descriptor.name for one in every if one.distribution == subject.distribution]  # candidates
 
     def press(sensor: SensorDescriptor, sign: str, seed: int = 1) -> tuple[Recorded, dict[str, list[Any]]]:
         """Return a press with the effect ("+") or without it ("-"), and what an effect could change in it."""
