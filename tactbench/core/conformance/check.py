@@ -29,7 +29,7 @@ from tactbench.core.plugins.registry import Registry, ask_plugin, line_in, load_
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
 EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
 KINDS = EVERY_KIND[:-1]
-"""Of what hooks give; a data set is a file."""
+"""Kinds of descriptors; a data set is a file."""
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""

@@ -16,7 +16,7 @@ ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 400, 40, 7, 3, 1
 FEW_ROWS = 40  # of few shots: a protocol that teaches a handful of presses gives no more
 LEVEL = 5.0  # mean of the answers: forces do not lie about 0
 BETTER = 0.9  # of the trivial answer's error: the question is linear with a tenth of noise, and ours are at half
-SAME_ROW = 1e-6  # relative difference of one row answered alone and among others: sums of another order
+SAME_ROW = 1e-6  # relative difference between a row by itself and among others: sums of another order
 
 
 def question(kind: str) -> list[Any]:

@@ -19,11 +19,10 @@ from tactbench.core.conformance.streams import (
     carried_out,
     differing,
     force_is,
-    marks_of,
     pressing_force,
     times_are_right,
 )
-from tactbench.core.errors import UsageError, nearest
+from tactbench.core.errors import UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.rigs import rig_context
@@ -38,12 +37,11 @@ from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N, REAL_N, EFFECT_N = 0.5, 1.0, 2.0  # every sensor bears the first; motors follow the second; effects need load
 TASK_N = 5.0  # the range of our tasks of force
-NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws can be told apart
+NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws differ visibly
 SECONDS, LATE = 1.0, 0.5  # duration of a press; share by which a rig that begins later may deviate from it
-MOST_SATURATED = 0.5  # share of the samples of a press that a taxel may stand at a limit
 LEAST_RISE = 0.02  # of its whole change, in the upper part of a channel's range (assumed: foams harden)
 ALWAYS_WANTED = ("stored", "reference-force")  # tokens that every recording needs, beside the kinds of channels
-READINGS = frozenset((*get_args(ChannelKind), "disturbance", "reading", "stored"))  # tokens that mean readings alone
+READINGS = frozenset((*get_args(ChannelKind), "disturbance", "reading", "stored"))  # tokens that change only readings
 REACH_MM, FLAT = 15.0, 2e-3  # half-width of the examined square; share of its largest dimension by which a body rises
 LOWEST_MM = 1e-9  # rounding of the lowest point, which is at 0
 CALLS = 8  # calls of `called_for` for one scene: a random answer then shows
@@ -72,10 +70,10 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
     """Return sensors that can be simulated: those of this package, the cheapest first, then the plugin's own."""
-    able = [(not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells), one.descriptor.name, one.descriptor)
-            for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
+    able = [one for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
             if one.descriptor.spec.skin is not None and one.descriptor.transducer is not None]  # fmt: skip
-    return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
+    able.sort(key=lambda one: (not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells)))  # type: ignore[union-attr]
+    return [one.descriptor for one in able]
 
 
 def first_press(subject: Subject, scene: Scene, field: str) -> Recorded:  # noqa: RET503  (`skip` returns nothing)
@@ -87,19 +85,14 @@ def first_press(subject: Subject, scene: Scene, field: str) -> Recorded:  # noqa
     skip("no sensor that can be simulated goes with it: it needs another rig, or recordings")
 
 
-def _own_range_n(subject: Subject) -> float:
-    """Return the upper end [N] of the range of the data sheet; 0 if it is not stated or beyond that of any finger."""
-    stated = getattr(subject.spec, "data_sheet", None) and subject.spec.data_sheet.force_range
-    upper_n = 0.0 if stated is None else stated.upper * units.conversion(stated.unit, "N")
-    return upper_n if upper_n <= MOST_N else 0.0
-
-
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press of a sensor over its range on a simulated rig, or a tiny press by a rig."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        end_n = _own_range_n(subject) or TASK_N
+        stated = subject.spec.data_sheet.force_range
+        upper_n = 0.0 if stated is None else stated.upper * units.conversion(stated.unit, "N")
+        end_n = upper_n if 0.0 < upper_n <= MOST_N else TASK_N
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
@@ -126,30 +119,26 @@ def press_is_recorded(subject: Subject) -> None:
         times_are_right(f"streams: {name}", stream, SECONDS, LATE)
     fits(made.meta, made.came, made.meta.sensor)
     if subject.kind == "sensor":
-        _follows_the_force(made, _own_range_n(subject))
+        _follows_the_force(made)
 
 
-def _follows_the_force(made: Recorded, range_n: float) -> None:
-    """Fail where taxels are saturated for most of a press, or no channel changes with the force over a range [N]."""
+def _follows_the_force(made: Recorded) -> None:
+    """Fail where no channel changes any more in the upper part of a press."""
     pressing, force_n = pressing_force(made.came, made.meta.reference)
     rises = list[bool]()
     for spec in made.meta.sensor.streams:
-        stream, taxels = made.came[spec.name], [one.kind == "taxel" for one in spec.channels]
-        full = ((marks_of(stream) & Quality.SATURATED) != 0).mean(axis=0) * taxels
-        if full.max() > MOST_SATURATED:
-            where = f"streams: {spec.name}.{spec.channels[int(full.argmax())].name}"
-            fail(where, f"{full.max():.0%} of its samples stand at a limit in a press over its range of forces")
+        stream = made.came[spec.name]
         load = np.interp(stream.t_ns, pressing.t_ns, force_n) / force_n.max()  # type: ignore[arg-type]
         parts = [stream.data[(load > one) & (load < one + 0.2)].astype(float) for one in (0.0, 0.6, 0.85)]
         if all(map(len, parts)):
             low, mid, high = (one.mean(axis=0) for one in parts)
             responds = np.abs(high - low) > parts[-1].std(axis=0)
             rises.append(bool((responds & (np.abs(high - mid) > LEAST_RISE * np.abs(high - low))).any()))
-    if range_n and rises and not any(rises):
-        fail(
-            "spec.data_sheet.force_range",
-            f"no channel changes any more between {0.7 * range_n:.3g} and {range_n:.3g} N",
+    if rises and not any(rises):
+        text = (
+            f"no channel changes any more between {0.7 * force_n.max():.3g} and {force_n.max():.3g} N: state its range"
         )
+        fail("spec.data_sheet.force_range", text)
 
 
 @check("rig", needs="press-is-recorded")
@@ -186,14 +175,13 @@ def _full_scene(sensors: Sequence[SensorDescriptor]) -> Scene:
 def effect_takes_part(subject: Subject) -> None:
     """A plan takes effects by the tokens that they produce and consume, and by what called_for answers.
 
-    Produce what an effect or channel needs, and consume what an effect produces; compute the Reason from the scene and
-    the sensor alone.
+    Produce what an effect or channel needs, and consume what an effect produces; compute the Reason only from the
+    scene and the sensor.
     """
     effects, produced = subject.registry.effects, subject.descriptor.produces
     wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *(token for one in effects for token in one.consumes)}
     if not wanted.intersection(produced):
-        close = nearest(produced[0], wanted) if produced else []
-        fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
+        fail(f"produces{list(produced)}", f"nothing needs it: needed are {', '.join(sorted(wanted))}")
     for unknown in set(subject.descriptor.consumes) - {token for one in effects for token in one.produces}:
         fail(f"consumes[{unknown}]", "no installed effect produces it")
     sensors = simulated_sensors(subject)
@@ -221,10 +209,8 @@ def it_is_applied(subject: Subject) -> None:
     divisions; draw from run.of_recording(…), run.of_session(…) or run.of_unit(…).
     """
     sensors, (rig, descriptor) = simulated_sensors(subject), simulated_rig(subject)
-    scene, consumed = _full_scene(sensors), set(subject.descriptor.consumes)
-    siblings = [one.descriptor for one in subject.registry.effects.all_owned()
-                if one.distribution == subject.distribution]  # fmt: skip
-    words = [one.name for one in siblings if consumed.intersection(one.produces)]
+    scene, every = _full_scene(sensors), subject.registry.effects.all_owned()
+    words = [one.descriptor.name for one in every if one.distribution == subject.distribution]  # candidates
 
     def press(sensor: SensorDescriptor, sign: str, seed: int = 1) -> tuple[Recorded, dict[str, list[Any]]]:
         """Return a press with the effect ("+") or without it ("-"), and what an effect could change in it."""
@@ -260,7 +246,7 @@ def it_is_applied(subject: Subject) -> None:
 
 @check("indenter", needs="code-names-resolve")
 def indenter_is_pressed(subject: Subject) -> None:
-    """A height is asked for at all places at once and counted from the lowest point, which touches first.
+    """Heights are computed at all places at once and counted from the lowest point, which touches first.
 
     Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
     body is; choose defaults with flanks of up to 45 degrees. Never change x_mm or y_mm.

@@ -23,11 +23,13 @@ from tactbench.core.conformance.streams import (
 )
 from tactbench.core.recording.datasets import DataSet, copy_in
 from tactbench.core.recording.mapping import model
+from tactbench.core.recording.mapping.channels import sensor_of
 from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.samples import StreamData
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
+from tactbench.core.spec.task import TaskSpec
 
 LARGEST_N, MOST_N = 1000.0, 100.0  # largest and median force: a press of 10 N in gram-force reads 1020
 LOADED = 0.2  # share of the largest force from which a sample counts as loaded
@@ -148,7 +150,7 @@ def tasks_can_be_answered(subject: Subject) -> None:
 
 @check("dataset", needs="tasks-can-be-answered")
 def readings_are_as_stated(subject: Subject) -> None:
-    """What a mapping states wrongly is stored, and believed by everybody who reads the recordings.
+    """A wrong statement of a mapping is stored with the recordings, and their readers rely on it.
 
     Look at columns, units (`given_in`), sentinels, `sign`, `lower`, `upper`, `rest` and `rate_hz` of the channels that
     are named, and at the unit of the time.

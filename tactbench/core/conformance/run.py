@@ -7,11 +7,10 @@ from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
+from typing import Any
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
-    sensor_spec,
-    transducer,
+    sensor,
     press,
     task,
     estimator,
@@ -33,7 +32,6 @@ from tactbench.core.conformance.check import (
 )
 from tactbench.core.errors import TimedOut, UnknownNameError, error_text
 from tactbench.core.on_demand import contributed
-from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.recording.datasets import mapping_called, mappings_of
@@ -70,7 +68,7 @@ class CheckReport:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing failed."""
+        """Whether no check failed."""
         return not self.failed
 
     @property
@@ -94,7 +92,7 @@ class CheckReport:
 
 
 def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
-    """Return the descriptors called `name`, or else all that a plugin of that name brings.
+    """Return the descriptors called `name`, or else all descriptors of a plugin of that name.
 
     Raises
     ------
@@ -103,11 +101,11 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_
     """
     rows = plugins_named(registry, name)
     every = [(kind, one) for kind in kinds if kind != "dataset" for one in registry.families()[f"{kind}s"].all_owned()]
-    brought = {one for row in rows for one in row.brings}
+    offered = {one for row in rows for one in row.brings}
     mapping = mapping_called(name) if "dataset" in kinds else None
     files = [mapping] if mapping else [file for row in rows if not row.brings for file in mappings_of(row.module)]
     found = [(kind, one) for kind, one in every if one.descriptor.name == name] or [
-        (kind, one) for kind, one in every if f"{kind} {one.descriptor.name}" in brought
+        (kind, one) for kind, one in every if f"{kind} {one.descriptor.name}" in offered
     ]
     if not found and not files and not any(row.status == "failed" for row in rows):
         known = {one.descriptor.name for _, one in every} | {row.entry_point for row in registry.plugins}
@@ -131,12 +129,9 @@ def run_checks(
     subject: Subject,
     *,
     modes: Sequence[Mode] = ("passive",),
-    recording: Path | None = None,
-    rig_file: Path | None = None,
-    operator: Operator | None = None,
-    root: Path | None = None,
     isolated: bool = True,
     without: Collection[str] = (),
+    **fields: Any,
 ) -> CheckReport:
     """Run the checks of one plugin, each within limits.
 
@@ -144,21 +139,21 @@ def run_checks(
     ----------
     modes
         Modes of the checks. In the mode `recording` the plugin's code is not imported.
-    recording, rig_file, operator, root
-        As :class:`Subject` has them.
     isolated
         Whether in a child process. Checks of the mode `invasive` are always run in this process, without a time limit:
         an interrupt must reach the rig.
     without
         Names of checks that are left out.
+    fields
+        Values of the subject's fields `recording`, `rig_file`, `operator` and `root`.
     """
-    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator, root=root)
+    subject = replace(subject, **fields)
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
-            if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
+            if isinstance(given, BaseException):  # it hung or crashed; the remaining checks run in another process
                 late = isinstance(given, TimedOut)
                 text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)

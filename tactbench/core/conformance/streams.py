@@ -36,7 +36,7 @@ class Recorded(NamedTuple):
 
     meta: RecordingMeta
     came: Mapping[str, StreamData]
-    """By stream."""
+    """Data of each stream by its name."""
     wrong: str
     """First error that `tactbench inspect` reports; empty if there is none."""
 

@@ -13,7 +13,7 @@ from tactbench.core.conformance.press import MOST_N, SECONDS, WHY, first_press, 
 from tactbench.core.errors import nearest
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import Role
+from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, TaskSpec
 
 REFERENCE = ("force", "torque", "position")  # kinds of references; as features they would give the answer away
@@ -22,7 +22,6 @@ LEAST_SCENES = 5  # number from which it is no chance that a number rises with a
 LEAST_M, LARGEST_M = 1e-5, 1.0  # radii of caps that are pressed on a sensor
 LEAST_FORCE = 0.05  # smallest largest force of the scenes, in the unit of a force target
 GROUPS = ("recording", "unit", "trial", "press", "object", "block")  # of recordings or our mappings, beside labels
-NO_SCENES = "it has no scenes: recordings made elsewhere answer it"
 
 
 def _planned(spec: TaskSpec) -> Iterator[tuple[str, PlannedScene]]:
@@ -62,7 +61,7 @@ def names_are_known(subject: Subject) -> None:
 
 @check("task")
 def metric_has_its_unit(subject: Subject) -> None:
-    """The unit stands beside every score: errors are computed in the target's unit, and nobody converts them.
+    """The unit stands beside every score: errors are computed in the target's unit, and are not converted.
 
     Name a metric of the task's kind; state the target's unit for errors (rmse, mae, mean_euclidean_error), else 1.
     """
@@ -106,7 +105,7 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
         taught = {planned.scene.labels[target.name] for planned in spec.scenes if planned.role == "train"}
         strange = {planned.scene.labels[target.name] for planned in spec.scenes} - taught
         if len(taught) == 1 or (spec.kind == "classification" and taught and strange):
-            text = f"role train teaches {', '.join(map(str, taught))} alone; other roles have"
+            text = f"role train teaches {', '.join(map(str, taught))} only; other roles have"
             fail("spec.scenes", f"{text} {', '.join(sorted(map(str, strange))) or 'the same'}")
         _label_is_one_thing(spec, target)
     if "roles" not in spec.splits:
@@ -164,15 +163,18 @@ def _go_together(labels: Sequence[Any], values: Sequence[Any]) -> bool:
     return bool(np.any(signs) and (np.min(signs) >= 0 or np.max(signs) <= 0))
 
 
-@check("task")
+@check("task", needs="answers-are-in-the-scenes")
 def scenes_can_be_pressed(subject: Subject) -> None:
     """One scene of a hundred that cannot be carried out ends a campaign when the others are recorded.
 
-    Name installed shapes with dimensions of theirs, and state forces in newtons and lengths in millimetres.
+    Name installed shapes with dimensions of theirs, and state forces in newtons and lengths in millimetres. Correct
+    what the message names: indenter, placement, slide or effects of the scene, or the target.
     """
     spec = subject.spec
     if not spec.scenes:
-        skip(NO_SCENES)
+        skip("it has no scenes: recordings made elsewhere answer it")
+    force = getattr(spec.target, "kind", "") == "force"
+    least_n = LEAST_FORCE * units.conversion(spec.target.unit, "N") if force else 0.0
     for place, planned in _planned(spec):
         body, force_n = planned.scene.indenter, planned.scene.profile.largest_n
         with code_of(f"{place}.indenter", subject):
@@ -180,30 +182,21 @@ def scenes_can_be_pressed(subject: Subject) -> None:
                 subject.registry.indenters[body.shape].sizes(body.dimensions)
         if body.radius is not None and not LEAST_M <= body.radius.to("m") <= LARGEST_M:
             fail(f"{place}.indenter.radius", f"{body.radius} is not within {1e3 * LEAST_M:g} to {1e3 * LARGEST_M:g} mm")
-        force = getattr(spec.target, "kind", "") == "force"
-        least_n = LEAST_FORCE * units.conversion(spec.target.unit, "N") if force else 0.0
         if not least_n <= force_n <= MOST_N:
             fail(f"{place}.profile", f"its largest force is {force_n:g} N: is its unit, and that of the target, right?")
+    _check_first_press(subject, spec.scenes[0].scene)
 
 
-@check("task", needs="answers-are-in-the-scenes")
-def its_scene_is_carried_out(subject: Subject) -> None:
-    """A scene that no rig can carry out, or whose target no rig records, is found out after those before it.
-
-    Correct what the message names: indenter, placement, slide, effects or profile of the scene, or the target.
-    """
-    spec = subject.spec
-    if not spec.scenes:
-        skip(NO_SCENES)
-    scene = spec.scenes[0].scene
-    slide = scene.slide
+def _check_first_press(subject: Subject, scene: Scene) -> None:
+    """Fail where a scene cannot be simulated, or the target is not recorded."""
+    tiny, slide = tiny_scene(), scene.slide
     if slide is not None:
         slide = slide.model_copy(update={"start": assumed(SECONDS / 2, "s", WHY), "duration": None})
-    kept = {field: getattr(scene, field) for field in
-            ("indenter", "placement", "observe", "labels", "drive", "simulation")}  # fmt: skip
-    press = first_press(subject, tiny_scene(slide=slide, **kept), f"spec.scenes[{scene.name}]")
+    kept = {"profile": tiny.profile, "environment": tiny.environment, "slide": slide}
+    press = first_press(subject, scene.model_copy(update=kept), f"spec.scenes[{scene.name}]")
     recorded = [(channel.kind, channel.name) for stream in press.meta.reference for channel in stream.channels]
-    for one in getattr(spec.target, "components", (spec.target,)):
+    target = subject.spec.target
+    for one in getattr(target, "components", (target,)):
         if isinstance(one, ChannelTarget) and not any(one.kind == k and one.name in (None, n) for k, n in recorded):
             there = ", ".join(f"{name} ({kind})" for kind, name in recorded)
             fail("spec.target", f"no {one.kind} {one.name or ''} is recorded; there is {there}")

@@ -27,7 +27,7 @@ from tactbench.core.interrupts import interrupts_held
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
-from tactbench.core.pool import Engine, Limits, Pool
+from tactbench.core.pool import Engine, Limits, Pool, preload
 from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance.source import ANSWERING, sources_of, versions
 from tactbench.core.thread_limit import VARIABLES
@@ -150,6 +150,7 @@ def carry_out(work: Callable[[Any], Any], job: Job, folder: str, limits: Limits)
 def _prepared(threads: Mapping[str, str]) -> dict[str, str]:
     """Prepare a worker for having child processes, and return its environment."""
     multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
+    preload("tactbench.core.matrix.preloaded")
     os.environ.update(threads)
     return environment()
 

@@ -33,17 +33,9 @@ class Keys:
 
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
-        task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
-        features_by = self.registry.tasks[cell.task].spec.features_by
-        modules = [task.module, estimator.module, estimator.descriptor.where, features_by]
-        sections = {
-            "task": task.declared or cell.task,
-            "estimator": cell.estimator,
-            "versions": versions(estimator.descriptor.distributions),
-            "source": sources_of(filter(None, modules), ANSWERING),
-            "configuration": configuration_of(cell),
-        }
-        return _keyed(sections, data)
+        task = self.registry.tasks.owned(cell.task)
+        modules = [task.module, self.registry.tasks[cell.task].spec.features_by]
+        return self._of_answer(cell, data, modules, task=task.declared or cell.task)
 
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
@@ -53,19 +45,29 @@ class Keys:
         Raises ValueError as :func:`identity_of` does.
         """
         tasks, metric = self.registry.tasks, how["metric"]
-        modules = [task.features_by] if task.features_by else []
-        modules += [tasks.owned(task.name).module] if task.name in tasks else []
-        named = self.registry.estimators.owned(cell.estimator) if how["given"] is None else None
-        modules += [named.module, named.descriptor.where] if named else []
+        modules = [task.features_by, tasks.owned(task.name).module if task.name in tasks else None]
+        given = identity_of({**how, "metric": metric.function or metric.name})
+        named = how["given"] is None
+        return self._of_answer(cell, data, modules, named, task=digest_of(task.model_dump_json()), given=given)
+
+    def _of_answer(
+        self, cell: Cell, data: Mapping[Path, str], modules: list[str | None], named: bool = True, **more: Any
+    ) -> tuple[str, Sections]:
+        """Return the key of a result and its sections; the names of recordings are shown but do not count."""
+        estimator = self.registry.estimators.owned(cell.estimator) if named else None
+        modules += [estimator.module, estimator.descriptor.where] if estimator else []
         sections = {
-            "task": digest_of(task.model_dump_json()),
+            **more,
             "estimator": cell.estimator,
-            "given": identity_of({**how, "metric": metric.function or metric.name}),
-            "versions": versions(named.descriptor.distributions if named else ()),
-            "source": sources_of(modules, ANSWERING),
-            "configuration": configuration_of(cell),
-        }
-        return _keyed(sections, data)
+            "versions": versions(estimator.descriptor.distributions if estimator else ()),
+            "source": sources_of(filter(None, modules), ANSWERING),
+            "configuration": {
+                "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
+                "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,
+            },
+        }  # fmt: skip
+        key = digest_of(_canonical({**sections, "data": list(data.values())}))
+        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 
     def of_recording(
         self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: RigFile | None = None
@@ -86,36 +88,21 @@ class Keys:
         sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
         if rig_file is not None and not rig_file.emulated:
             return sections
-        owner, carrier, shape = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig), scene.indenter.shape
-        modules = [owner.module, carrier.module, carrier.descriptor.where]
-        modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
-        modules += [] if rig_file is None else self._behind(rig_file)
-        for effect in taking_part(self.registry, owner.descriptor, scene):
+        registry, shape = self.registry, scene.indenter.shape
+        owner, carriers = registry.sensors.owned(sensor), [registry.rigs.owned(rig)]
+        modules = [owner.module, owner.descriptor.transducer, owner.descriptor.driver]
+        if rig_file is not None:
+            names = [entry.device for entry in (rig_file.force, *rig_file.devices.values()) if entry is not None]
+            modules += [registry.devices.owned(name).module for name in names]
+            carriers.append(registry.rigs.owned(rig_file.emulation.physics))
+        for effect in taking_part(registry, owner.descriptor, scene):
             modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-        if shape is not None and shape in self.registry.indenters:  # the rig refuses an unknown one
-            indenter = self.registry.indenters.owned(shape)
+        for one in carriers:
+            modules += [one.module, one.descriptor.where]
+        if shape is not None and shape in registry.indenters:  # the rig refuses an unknown one
+            indenter = registry.indenters.owned(shape)
             modules += [indenter.module, indenter.descriptor.where]
-        return sections | {"versions": versions(), "source": sources_of(modules, RECORDING)}
-
-    def _behind(self, devices: RigFile) -> list[str]:
-        """Return the modules of a rig file's devices, and of the simulation behind the emulated ones."""
-        names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
-        physics = self.registry.rigs.owned(devices.emulation.physics)
-        return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
-
-
-def _keyed(sections: Sections, data: Mapping[Path, str]) -> tuple[str, Sections]:
-    """Return the key of a result and its sections; the names of recordings are shown but do not count."""
-    key = digest_of(_canonical({**sections, "data": list(data.values())}))
-    return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
-
-
-def configuration_of(cell: Cell) -> Sections:
-    """Return the part of a cell's configuration that its key covers."""
-    return {
-        "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
-        "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,
-    }  # fmt: skip
+        return sections | {"versions": versions(), "source": sources_of(filter(None, modules), RECORDING)}
 
 
 def differences(

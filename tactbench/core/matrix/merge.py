@@ -17,10 +17,10 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from tactbench.core.errors import FolderError
@@ -94,16 +94,22 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
             f"The folders contradict each other: {'; '.join(against[:_SHOWN])}{more}.",
             hint="Nothing was written. Leave one of them out, or run the named cells again with the same version.",
         )
-    with _made(out) as aside:
-        recordings: set[str] = set()
-        for row, store in kept.values():
-            shutil.copyfile(store.file_of(row), aside / "cells" / store.file_of(row).name)
-            for name, file in store.recordings(row):
-                if not Path(name).is_absolute() and file is not None and name not in recordings:
-                    recordings.add(name)
-                    _link(file, aside / file.relative_to(store.folder))
-        if also is not None:
-            also(aside)
+    with writing(out):
+        out.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".merging-", dir=out.absolute().parent) as place:
+            aside = Path(place) / out.name
+            for part in ("cells", "recordings"):
+                (aside / part).mkdir(parents=True)
+            recordings: set[str] = set()
+            for row, store in kept.values():
+                shutil.copyfile(store.file_of(row), aside / "cells" / store.file_of(row).name)
+                for name, file in store.recordings(row):
+                    if not Path(name).is_absolute() and file is not None and name not in recordings:
+                        recordings.add(name)
+                        _link(file, aside / file.relative_to(store.folder))
+            if also is not None:
+                also(aside)
+            aside.rename(out)
     return Merged(tuple(row for row, _ in kept.values()), len(recordings), tuple(left_out))
 
 
@@ -138,18 +144,3 @@ def _link(path: Path, target: Path) -> None:
         os.link(path, target)
     except OSError:
         shutil.copyfile(path, target)
-
-
-@contextmanager
-def _made(out: Path) -> Iterator[Path]:
-    """Yield a temporary folder, which is renamed to `out` on success and removed on failure."""
-    aside = out.absolute().with_name(f".{out.absolute().name}.{os.getpid()}.merging")
-    with writing(out):
-        try:
-            for part in ("cells", "recordings"):
-                (aside / part).mkdir(parents=True, exist_ok=True)
-            yield aside
-            aside.rename(out)
-        except BaseException:
-            shutil.rmtree(aside, ignore_errors=True)
-            raise

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tactbench.core.errors import (
     MissingRecordingError,
@@ -30,10 +29,7 @@ from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig import RigDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget, in_drawn_order
-
-if TYPE_CHECKING:
-    from tactbench.core.recording.datasets import DataSet
+from tactbench.core.spec.task import ChannelTarget, TaskSpec, in_drawn_order
 
 RequestKey = tuple[str, str, str | None, int]
 """Sensor, task, split and seed, which determine the recordings of a cell."""
@@ -110,30 +106,27 @@ def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, pro
     UnknownNameError
         If there is no data set of that name.
     """
-    names = dict.fromkeys(choice.dataset for choice in matrix.tasks)
-    if not any(names):
-        return [Part(matrix, recordings)]
     from tactbench.core.recording.datasets import dataset_called
 
+    names = dict.fromkeys(choice.dataset for choice in matrix.tasks)
     known = {name: dataset_called(name) for name in names if name is not None}
     parts = []
     for name in names:
-        tasks = tuple(choice for choice in matrix.tasks if choice.dataset == name)
-        part = matrix.model_copy(update={"tasks": tasks})
-        parts.append(Part(part, recordings) if name is None else _from_dataset(part, known[name], root, progress))
+        part = matrix.model_copy(update={"tasks": tuple(choice for choice in matrix.tasks if choice.dataset == name)})
+        if name is None:
+            parts.append(Part(part, recordings))
+            continue
+        part = part.model_copy(update={"rig": installed().first_rig("replays")})
+        try:
+            parts.append(Part(part, known[name].recordings(root, progress)))
+        except TactbenchError as error:
+            mapping = known[name].mapping
+            part = part.model_copy(update={"sensors": matrix.sensors or (mapping.sensor.name,)})
+            parts.append(Part(part, None, error, mapping.tasks))
     troubles = [part.trouble for part in parts if part.trouble is not None]
     if troubles and len(troubles) == len(parts):
         raise troubles[0]
     return parts
-
-
-def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress) -> Part:
-    matrix = matrix.model_copy(update={"rig": installed().first_rig("replays")})
-    try:
-        return Part(matrix, dataset.recordings(root, progress))
-    except TactbenchError as error:
-        sensors = matrix.sensors or (dataset.mapping.sensor.name,)
-        return Part(matrix.model_copy(update={"sensors": sensors}), None, error, dataset.mapping.tasks)
 
 
 def plan_parts(
@@ -207,20 +200,18 @@ def plan_run(
 def _unanswerable(
     key: RequestKey, registry: Registry, rig: RigDescriptor, file: RigFile | None
 ) -> NotApplicable | None:
-    """Return why a rig of real devices and a sensor cannot answer a task, by what their specs state; None: they may."""
+    """Return the reason for which specs rule out a task on a rig of real devices with a sensor, or None."""
     spec, task = registry.sensors[key[0]].spec, registry.tasks[key[1]].spec
-    if rig.simulated or rig.references is None:  # a simulated rig says so itself, and nobody presses for it
+    if rig.simulated or rig.references is None:  # a simulated rig raises it itself, at no cost
         return None
     kinds = {channel.kind for channel in spec.channels()}
     if not kinds & {*task.features, *task.optional_features}:
         needed = " or ".join(task.features)
         return NotApplicable(f"Task {task.name!r} needs channels of kind {needed}; {spec.name} has none.", hint="")
-    wanted: list[tuple[str, str | None]] = []
+    parts = getattr(task.target, "components", (task.target,))
+    wanted = [(one.kind, one.name) for one in parts if isinstance(one, ChannelTarget)]
     if isinstance(task.target, SlipTarget):
         wanted = [("position", "slip")]
-    elif not isinstance(task.target, LabelTarget):
-        parts = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
-        wanted = [(one.kind, one.name) for one in parts]
     for kind, name in wanted:
         names = rig.references.get(kind)
         lacking = names is None or (kind in ("force", "torque") and file is not None and file.force is None)

@@ -11,7 +11,7 @@ from tactbench.core.thread_limit import keep_threads
 keep_threads()
 if hasattr(os, "setsid"):
     with suppress(OSError):
-        os.setsid()  # Ctrl-C in a terminal then reaches the run alone, which ends its workers
+        os.setsid()  # Ctrl-C in a terminal then reaches only the run, which ends its workers
 
 # A pipe that the run writes to ends with the run: workers print to logs of their own.
 nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,12 +23,12 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.record import GRACE_S, Recorder, foreign_components, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator, RecordingRequest
-from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.registry import Family, Registry, installed
+from tactbench.core.plugins.rigs import rig_of, taking_part
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
 from tactbench.core.progress import Progress
 from tactbench.core.provenance.gather import gather, usable_cores
@@ -36,6 +37,8 @@ from tactbench.core.spec.row import STOPPED
 from tactbench.core.spec.task import TaskSpec
 
 EngineName = Literal["in-process", "isolated", "dask"]
+GRACE_S = 5.0
+"""Seconds for a real rig to stop and close its devices after a timeout."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,6 @@ class Outcome:
     """Result of a run."""
 
     rows: tuple[Row, ...]
-    provenance: dict[str, Any]
     computed: int
     """Number of cells computed in this run; the others were reused."""
     recorded: int
@@ -137,7 +139,7 @@ def run_matrix(
     choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
     if choice.name == "dask":
-        matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
+        matrix = matrix.model_copy(update={"latency": False})  # other work may run beside a cell on a cluster
     with store.hold():
         preload("tactbench.core.matrix.preloaded")
         parts = parts_of(matrix, recordings, root, progress)
@@ -145,13 +147,11 @@ def run_matrix(
         registry = with_declared(installed(), declared)
         keys = Keys(registry)
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
-        provenance = gather(registry, seed=matrix.seed, engine=choice.name)
-        store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress, cells)
-        run.carry_out([cell for cell in cells if cell.timed], alone=True)
-        run.carry_out([cell for cell in cells if not cell.timed], alone=False)
-    rows = tuple(run.rows[cell.name] for cell in cells)
-    return Outcome(rows, provenance, run.computed, run.recorded)
+        store.begin(gather(registry, seed=matrix.seed, engine=choice.name))
+        run = Run(store, registry, keys, plan, choice, operator, progress)
+        for timed in (True, False):
+            run.carry_out([cell for cell in cells if cell.timed == timed], timed=timed)
+    return Outcome(tuple(run.rows[cell.name] for cell in cells), run.computed, run.recorded)
 
 
 @dataclass
@@ -165,13 +165,12 @@ class Run:
     choice: EngineChoice
     operator: Operator | None
     progress: Progress
-    cells: Sequence[Cell]
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
     recorded: int = 0
 
-    def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
-        """Make the missing recordings of `cells`, then evaluate them; `alone`: one cell at a time."""
+    def carry_out(self, cells: Sequence[Cell], *, timed: bool) -> None:
+        """Make the missing recordings of `cells`, then evaluate them; timed ones are evaluated one at a time."""
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
@@ -179,12 +178,13 @@ class Run:
         groups = [jobs for need, some in by_need.items() if (jobs := self._jobs(self.plan[need], some))]
         if not groups:
             return
-        self.progress.begin("evaluating, timed" if alone else "evaluating", sum(map(len, groups)))
-        at_once = 1 if alone or self.choice.name == "in-process" else self.choice.processes
+        self.progress.begin("evaluating, timed" if timed else "evaluating", sum(map(len, groups)))
+        at_once = 1 if timed or self.choice.name == "in-process" else self.choice.processes
         with self.choice.engine(at_once) as engine:
             self._submit_cells(engine, groups, at_once)
             for job, outcome in engine.outcomes():
-                self._evaluated(job, outcome, engine.log)
+                self._ended(job.cell, job.task, outcome, job.key, job.sections, engine.log)
+                self.progress.advance(job.cell.name, stopped=self.rows[job.cell.name]["status"] in STOPPED)
 
     # Recordings
 
@@ -204,15 +204,14 @@ class Run:
                 for request, outcome in recorder.outcomes():
                     self._recorded(request, outcome)
         finally:
-            self._clear(missing.values())  # of an interrupted run, too
+            self._clear(requests)  # of an interrupted run, too
 
-    def _clear(self, requests: Iterable[RecordingRequest]) -> None:
+    def _clear(self, requests: Sequence[RecordingRequest]) -> None:
         """Remove unfinished files of killed simulations; data of devices are never removed."""
-        by_path = {request.path: request for request in requests}
-        for folder in {path.parent for path in by_path}:
+        computed = {request.path.name for request in requests if is_computed(request)}
+        for folder in {request.path.parent for request in requests}:
             for left in folder.glob("*.h5.*"):
-                request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
-                if request is not None and is_computed(request):
+                if f"{left.name.partition('.h5.')[0]}.h5" in computed:
                     left.unlink(missing_ok=True)
 
     def _is_there(self, request: RecordingRequest) -> bool:
@@ -267,14 +266,14 @@ class Run:
                 digests = digests or {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
-                self._stopped(cell, task, error)
+                self._ended(cell, task, error)
                 continue
             found = self.store.finished(key)
             if found is None:
                 estimator = self.registry.estimators[cell.estimator]
                 jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
-            # Its key covers neither its name nor what is published: they change no number.
+            # Its key covers neither its name nor published figures: they change no number.
             row = {**found, "cell": cell.name, **published(cell, task, found["split"])}
             self.store.reuse(row)
             self.rows[cell.name] = row
@@ -292,23 +291,48 @@ class Run:
             for piece in pieces.values():
                 engine.submit(work, piece)
 
-    def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
-        """Store the result or the error of a cell."""
-        cell = job.cell
+    def _ended(
+        self, cell: Cell, task: TaskSpec, outcome: Any, key: str = "", sections: Sections | None = None, log: str = ""
+    ) -> None:
+        """Store the result of a cell, or the error that stopped it."""
         if isinstance(outcome, BaseException):
-            self._stopped(cell, job.task, outcome, job.key, job.sections)
+            row, answers = unanswered(cell, task, outcome, simulated=self.registry.rigs[cell.rig].simulated), None
         else:
             row, answers = outcome
-            paths = [self.store.beside(Path(path)) for path in row["recordings"]]
-            self.rows[cell.name] = self.store.keep(
-                {**row, "key": job.key, "log": log, "recordings": paths}, job.sections, answers
-            )
-            self.computed += 1
-        self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-
-    def _stopped(
-        self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None
-    ) -> None:
-        row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
-        self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {})
+            row |= {"log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
+        self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {}, answers)
         self.computed += 1
+
+
+class Recorder:
+    """Makes recordings one after the other; their rig, from `registry`, is built once."""
+
+    def __init__(self, registry: Registry, operator: Operator | None) -> None:
+        self._operator = operator
+        self._built: Any = None
+        self._registry = registry.with_tasks(Family("task"))  # tasks would be most of the pickled data
+
+    def __call__(self, request: RecordingRequest) -> None:
+        """Make a recording; raises whatever the rig raises."""
+        from tactbench.core.acquisition import acquire
+
+        if self._built is None:
+            self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
+        # The cost of a simulation is processor time, since several run at once; that of a real rig is wall time.
+        acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
+
+
+def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
+    """Return the names of effects and of an indenter of other packages that making a recording may import."""
+    effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
+    shape = str(request.scene.indenter.shape)
+    foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
+    return (*(one.descriptor.name for one in effects if not one.ours), *foreign)
+
+
+def is_computed(request: RecordingRequest) -> bool:
+    """Return whether a recording is computed on this machine, without real devices and wall-clock time."""
+    simulated, devices = request.rig.simulated, request.rig_file
+    if simulated or devices is None:
+        return simulated
+    return all(entry.emulated for entry in devices.entries().values())

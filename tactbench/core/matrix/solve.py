@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import ALIKE, Cell
+from tactbench.core.matrix.store.index import signature
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance.gather import host_id
@@ -70,8 +71,7 @@ def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplet
     """Return the dataset of a task from `recordings`; the last one is kept for the next cell."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    states = [(one.st_ino, one.st_mtime_ns, one.st_size) for one in map(os.stat, filter(os.path.exists, recordings))]
-    wanted = [task, recordings, states, include_incomplete]
+    wanted = [task, recordings, list(map(signature, recordings)), include_incomplete]
     if _last[:4] != wanted:
         _last[:] = [*wanted, load_dataset(task, recordings, include_incomplete=include_incomplete)]
     found: Dataset = _last[4]
@@ -108,7 +108,7 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
     from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 
     began = time.perf_counter()
-    # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
+    # The global generators get the cell's seed: their draws do not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = read_dataset(task, recordings, cell.include_incomplete)
@@ -147,13 +147,11 @@ def check_content(job: Job) -> None:
 
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with every key of the format, filled with what is known before the evaluation."""
-    unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
     of_task = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
-        **unknown,
+        **dict(RowModel.model_construct(cell=cell.name, status="skipped")),
         **{name: getattr(cell, name) for name in ALIKE},
         **{name: getattr(task, name) for name in of_task},
-        "cell": cell.name,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
         "simulation": cell.simulation.model_dump(mode="json", exclude_defaults=True),
@@ -202,12 +200,11 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
     """Return the assumptions of simulated recordings; where they differ, the range or all values."""
     found: dict[str, Scalar] = {}
     for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
-        values = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
-        numbers = [value for value in values if isinstance(value, int | float)]
+        values: list[Any] = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
         if len(values) == 1:
             found[name] = values[0]
-        elif len(numbers) == len(values):
-            found[name] = f"{min(numbers):g} to {max(numbers):g}"
+        elif all(isinstance(value, int | float) for value in values):
+            found[name] = f"{min(values):g} to {max(values):g}"
         else:
-            found[name] = ", ".join(str(value) for value in values)
+            found[name] = ", ".join(map(str, values))
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -67,8 +68,8 @@ class StoredCell:
                 requests = requests_for([self.cell], self.registry, keys, again)[need]
                 source = RecordingSource([request.path for request in requests], requests)
             choice = EngineChoice("in-process")
-            run = Run(again, self.registry, keys, {need: source}, choice, None, progress, [self.cell])
-            run.carry_out([self.cell], alone=True)
+            run = Run(again, self.registry, keys, {need: source}, choice, None, progress)
+            run.carry_out([self.cell], timed=True)
             row = run.rows[self.cell.name]
             done = row["status"] == self.row["status"] == "done"
             old, new = (
@@ -97,12 +98,12 @@ def stored_cell(store: Store, given: str) -> StoredCell:
 
 
 def meant(given: str, names: Sequence[str]) -> str:
-    """Return the one of `names` that `given` stands for: the name, a part of only one name, or some of its parts.
+    """Return the one of `names` that `given` stands for: the name, some of its parts in order, or a piece of it.
 
     ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
 
-    The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
-    part, stands for the first of them.
+    The replicates of a cell differ only in the last part of their names: if all that fit are replicates of one cell,
+    `given` stands for the first of them.
 
     Raises
     ------
@@ -111,13 +112,11 @@ def meant(given: str, names: Sequence[str]) -> str:
     """
     if given in names:
         return given
-    found = (
-        [name for name in names if _parts(name)[0] == given]
-        or [name for name in names if given in name]
-        or [name for name in names if _is_short(given, name)]
-    )
-    if len({_parts(name)[0] for name in found}) == 1:
-        return min(found, key=lambda name: _parts(name)[1])
+    parts = "/(.*/)?".join(map(re.escape, given.split("/")))
+    patterns = rf"{re.escape(given)}/\d+$", f"(^|/){parts}(/|$)", re.escape(given)
+    found = next(filter(None, ([one for one in names if re.search(pattern, one)] for pattern in patterns)), [])
+    if len({_replicate(name)[0] for name in found}) == 1:
+        return min(found, key=_replicate)
     if not found:
         raise UsageError(
             f"There is no cell called {given!r} among {len(names)}.",
@@ -130,13 +129,7 @@ def meant(given: str, names: Sequence[str]) -> str:
     )
 
 
-def _is_short(given: str, name: str) -> bool:
-    """Return whether the parts of `given` occur in a name, in the same order."""
-    parts = iter(name.split("/"))
-    return all(one in parts for one in given.split("/"))
-
-
-def _parts(name: str) -> tuple[str, int]:
+def _replicate(name: str) -> tuple[str, int]:
     """Return the part of a name that all replicates of a cell share, and the number of the replicate."""
     cell, _, seed = name.rpartition("/")
     return (cell, int(seed)) if seed.isdecimal() else (name, 0)

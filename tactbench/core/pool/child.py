@@ -12,16 +12,44 @@ import threading
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
+import psutil
+
 from tactbench.core import errors
 from tactbench.core.errors import OutOfMemory, Raised, TactbenchError, error_text
-from tactbench.core.pool.limits import Limits, resident_mb
 
 LOG_BYTES = 2**16
 """Length of the end of a log that is kept."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one item, a cell or a recording; None means no limit."""
+
+    timeout_s: float | None = None
+    """Seconds of wall time."""
+    memory_mb: int | None = None
+    """MB (2**20 bytes) beyond what its process holds when the item begins."""
+    grace_s: float = 0.0
+    """Seconds between SIGTERM and SIGKILL, so that a rig can close its devices."""
+
+
+UNLIMITED = Limits()
+
+
+def resident_mb(pid: int) -> float:
+    """Return the resident memory of a process and its descendants, MB; 0 once it has ended."""
+    found = list[int]()
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for one in (process, *process.children(recursive=True)):
+            with suppress(psutil.Error):
+                found.append(one.memory_info().rss)
+    return sum(found) / 2**20
 
 
 def run_child(
@@ -44,7 +72,7 @@ def run_child(
     printed = _redirect(log)
     if hasattr(os, "setsid"):
         with suppress(OSError):
-            os.setsid()  # its process group, by which the parent ends it with what it has started
+            os.setsid()  # a process group, by which the parent ends it together with its own children
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _terminate)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -52,7 +80,7 @@ def run_child(
     os.chdir(folder)
     me = os.getpid()
     for item in items:
-        os.ftruncate(1, 0)  # of what is printed, only that of one item is kept
+        os.ftruncate(printed, 0)  # the log holds the output of one item
         connection.send(("begun", resident_mb(me), ""))
         kind, value = _carry_out(work, item, limits)
         if os.getpid() != me:
@@ -113,12 +141,10 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
 
 def _end_with_parent() -> None:
     """End this process and its group when the parent has ended, however that happened."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        if hasattr(os, "killpg"):
-            os.killpg(0, signal.SIGKILL)
-        os._exit(1)
+    multiprocessing.parent_process().join()  # type: ignore[union-attr]
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)
 
 
 def plain_error(error: BaseException) -> TactbenchError:

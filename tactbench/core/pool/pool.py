@@ -20,8 +20,7 @@ import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
 from tactbench.core.interrupts import interrupts_held
-from tactbench.core.pool.child import end_of, plain_error, run_child
-from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
+from tactbench.core.pool.child import UNLIMITED, Limits, end_of, plain_error, resident_mb, run_child
 
 START_S = 60.0
 """Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
@@ -188,7 +187,7 @@ class _Child:
                         continue
                     return _with_log(value, log, began_s)
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
-            except (EOFError, OSError):  # it has ended, or closed what is not its own
+            except (EOFError, OSError):  # it has ended, or closed the connection
                 self._process.join(1.0)
                 stopped = self._crashed()
             if stopped is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
-import json
 import pickle
 import pickletools
 import sys
@@ -82,11 +81,6 @@ def version_of(distribution: str) -> str:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return "missing"
-
-
-def provenance_id(provenance: Mapping[str, Any]) -> str:
-    """Return the identifier of a provenance in rows."""
-    return digest_of(json.dumps(provenance, sort_keys=True))[:16]
 
 
 def digest_of(text: str) -> str:

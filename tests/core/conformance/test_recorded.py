@@ -16,16 +16,8 @@ RATE_HZ = 50.0
 FORCE = StreamSpec(
     name="force_torque", rate_hz=RATE_HZ, channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)
 )
-VARIANTS = {
-    "sound": None,
-    "of another sensor": "recording-fits-the-spec",
-    "with a dead channel": "recording-fits-the-spec",
-    "with a clock that goes back": "recording-fits-the-spec",
-    "at another rate": "recording-fits-the-spec",
-    "beyond the limits": "recording-fits-the-spec",
-    "in grams": "recording-fits-the-spec",
-    "with the sign turned": "recording-fits-the-spec",
-}
+VARIANTS = ("sound", "of another sensor", "with a dead channel", "with a clock that goes back", "at another rate",
+            "beyond the limits", "in grams", "with the sign turned")  # fmt: skip
 
 
 def written(path, variant, *, simulated=False):
@@ -60,15 +52,12 @@ def written(path, variant, *, simulated=False):
     return path
 
 
-def report_of(path):
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_each_but_the_sound_one_fails(tmp_path, variant):
     (subject,) = subjects_named(installed(), "icub", ("sensor",))
-    return run_checks(subject, modes=("recording",), recording=path, isolated=False)
-
-
-@pytest.mark.parametrize(("variant", "meant"), VARIANTS.items(), ids=list(VARIANTS))
-def test_each_is_caught_by_the_check_that_is_meant_for_it(tmp_path, variant, meant):
-    failed = report_of(written(tmp_path / "press.h5", variant)).failed
-    assert [one.check for one in failed] == ([] if meant is None else [meant])
+    path = written(tmp_path / "press.h5", variant)
+    failed = run_checks(subject, modes=("recording",), recording=path, isolated=False).failed
+    assert [one.check for one in failed] == ([] if variant == "sound" else ["recording-fits-the-spec"])
     assert all(one.where for one in failed)
 
 

@@ -43,7 +43,7 @@ def test_a_worker_that_differs_is_named(monkeypatch):
     monkeypatch.setattr(dask, "environment", lambda: next(found))
     with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
         engine = dask.Dask(1, UNLIMITED, cluster.scheduler_address)
-        with pytest.raises(UsageError, match=r"cannot be used: here and there scipy 0.1 -> 9.9"):
+        with pytest.raises(UsageError, match=r"scipy 0.1"):
             engine.__enter__()
 
 

@@ -67,7 +67,9 @@ def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_pa
     verbs, asked = Verbs(tmp_path, here=True), [shelf if word == "shelf" else word for word in ANY_SENSOR]
     rows = json.loads(verbs(*asked, "--out", "out").stdout)
     assert {row["status"] for row in rows} == {"done"}
-    assert "3 of 3 answers were found finished" in verbs(*asked, "--out", "out").stderr
+    written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cells").iterdir()}
+    verbs(*asked, "--out", "out")
+    assert {path: path.stat().st_mtime_ns for path in written} == written, "all were found finished"
     store = Store(tmp_path / "out")
     assert {path for row in store.rows() for _, path in store.recordings(row)} == {*(tmp_path / shelf).iterdir()}
     for suffix in ("txt", "tex", "parquet", "xlsx"):
@@ -78,9 +80,9 @@ def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_pa
 @pytest.mark.parametrize(
     ("rig", "says", "kept"),
     [
-        ("evil-unbuilt", "could not be built: OSError: no such port", 0),
-        ("evil-dying", "signal 6 (SIGABRT)", 2),
-        ("evil-device", "longer than 2 s", 2),
+        ("evil-unbuilt", "OSError", 0),
+        ("evil-dying", "SIGABRT", 2),
+        ("evil-device", "2 s", 2),
     ],
 )
 def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says, kept):

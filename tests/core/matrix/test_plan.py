@@ -1,34 +1,34 @@
+"""The cells of a matrix, and those that ``--probe`` adds."""
+
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.plan_recordings import request_key
-from tactbench.core.plugins.registry import load_registry
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.matrix import MatrixSpec
 
 
-@pytest.fixture(scope="module")
-def registry():
-    return load_registry()
+def plan(*tasks, sensors=("biotac",), **matrix):
+    return plan_cells(MatrixSpec.model_validate({"tasks": tasks, "repeats": 1, **matrix}), sensors, installed())
 
 
-def plan(registry, *tasks, sensors=("biotac",), repeats=1):
-    return plan_cells(MatrixSpec(tasks=tasks, repeats=repeats), sensors, registry)
+def ways(cells, estimator=None):
+    return [(cell.protocol, cell.split) for cell in cells if cell.estimator == (estimator or cells[0].estimator)]
 
 
-def test_every_sensor_meets_every_task_and_baselines_are_always_there(registry):
-    cells = plan(registry, TaskChoice(name="force"), TaskChoice(name="curvature"), sensors=("biotac", "icub"))
+def test_every_sensor_meets_every_task_and_baselines_are_always_there():
+    cells = plan({"name": "force"}, {"name": "curvature"}, sensors=("biotac", "icub"))
     pairs = {(sensor, task) for sensor in ("biotac", "icub") for task in ("force", "curvature")}
     assert {(cell.sensor, cell.task) for cell in cells if not cell.baseline} == pairs
     assert {cell.estimator for cell in cells if cell.baseline} == {"mean", "time-index", "chance", "majority"}
     assert len({cell.name for cell in cells}) == len(cells)
 
 
-def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules_it(registry):
-    tasks = (TaskChoice(name="force"), TaskChoice(name="slip"))
-    assert registry.tasks["slip"].spec.replicates == 1
+def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules_it():
+    assert installed().tasks["slip"].spec.replicates == 1
     for asked, expected in ((None, {"force": 8, "slip": 1}), (3, {"force": 3, "slip": 3})):
-        cells = plan(registry, *tasks, repeats=asked)
+        cells = plan({"name": "force"}, {"name": "slip"}, repeats=asked)
         seeds = {(cell.task, cell.name.rpartition("/")[2], cell.seed) for cell in cells}
         assert seeds == {(task, str(n), n) for task, repeats in expected.items() for n in range(1, repeats + 1)}
 
@@ -36,23 +36,49 @@ def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        (TaskChoice(name="force", estimators=(EstimatorChoice(name="forest", params={"trees": 5}),)), "n_estimators"),
-        (TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)), "classification"),
+        ({"name": "force", "estimators": [{"name": "forest", "params": {"trees": 5}}]}, "n_estimators"),
+        ({"name": "curvature", "estimators": [{"name": "lasso"}]}, "classification"),
+        ({"name": "force", "protocol": "karl2016", "split": "unit"}, "deployable"),  # it goes with roles only
     ],
 )
-def test_a_choice_that_is_not_there_is_answered_with_what_is(registry, choice, says):
+def test_a_choice_that_is_not_there_is_answered_with_what_is(choice, says):
     with pytest.raises((UnknownNameError, UsageError), match=says):
-        plan(registry, choice)
+        plan(choice)
 
 
-def ways(cells):
-    return [(cell.protocol, cell.split) for cell in cells if not cell.baseline]
-
-
-def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_others(registry):
-    with pytest.raises(UsageError, match="deployable"):
-        plan(registry, TaskChoice(name="force", protocol="karl2016", split="unit"))
-    both = plan(registry, TaskChoice(name="force", protocol=("karl2016", "deployable"), split="unit"))
+def test_a_pair_that_does_not_go_together_is_planned_among_others():
+    both = plan({"name": "force", "protocol": ("karl2016", "deployable"), "split": "unit"})
     assert ways(both) == [("karl2016", "unit"), ("deployable", "unit")]
     recorded = {request_key(cell)[2] for cell in both if cell.protocol == "karl2016"}
     assert recorded == {None}, "nothing is recorded for it"
+
+
+def curvature(protocol=None, split=None, probe=True):
+    choice = {name: value for name, value in (("protocol", protocol), ("split", split)) if value}
+    return plan({"name": "curvature", **choice}, sensors=("icub",), probe=probe)
+
+
+def test_three_more_ways_to_probe_after_those_asked_for():
+    asked, probed = curvature(probe=False), curvature()
+    assert probed[: len(asked)] == asked
+    expected = [("karl2016", None), ("deployable", "roles"), ("first-frame", "roles"), ("deployable", "shuffled")]
+    assert ways(probed) == ways(probed, "chance") == expected, "the trivial answers stand beside each"
+    assert len({cell.name for cell in probed}) == len(probed)
+
+
+@pytest.mark.parametrize(
+    ("asked", "probes"),
+    [
+        (("deployable", "session"), [("first-frame", "session"), ("deployable", "shuffled")]),
+        (("deployable", "shuffled"), [("deployable", None), ("first-frame", None)]),
+        ((["deployable"], ["in-session", "shuffled"]), [("deployable", None), ("first-frame", None)]),
+        ((["karl2016", "deployable"], None), [("first-frame", None), ("deployable", "shuffled")]),
+    ],
+)
+def test_probes_keep_apart_what_the_cell_keeps_apart(asked, probes):
+    assert ways(curvature(*asked)) == [*ways(curvature(*asked, probe=False)), *probes]
+
+
+def test_a_split_in_time_cannot_be_probed_by_itself():
+    with pytest.raises(UsageError, match="probe"):
+        curvature("deployable", "in-session")

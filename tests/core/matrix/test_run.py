@@ -97,30 +97,17 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
 
 def test_runs_of_other_seeds_merged_are_one_run(ran, shelf, tmp_path):
     """Of any seeds: a seed of both, which one of them timed, is taken once."""
-    for name, seed, repeats in (("a", 1, 1), ("b", 2, 1), ("c", 2, 2)):
+    for name, seed, repeats in (("a", 1, 1), ("b", 2, 2)):
         run_matrix(matrix(seed=seed, repeats=repeats), Store(tmp_path / name), choice=IN_THIS_PROCESS, recordings=shelf)
-
-    def table(folder):
-        store = Store(folder)
-        rows = json.loads(rendered(table_of(store, shown_rows(store)), "json"))
-        return decided(rows), [row["seeds"] for row in rows]
-
-    both = merge([tmp_path / "a", tmp_path / "b"], tmp_path / "both")
-    assert decided(both.rows) == decided(ran[0].rows)
-    assert table(tmp_path / "both")[1][0] == [1, 2]
-    assert table(tmp_path / "both") == table(ran[-1])
-    whole = merge([ran[-1], tmp_path / "c"], tmp_path / "whole")
+    whole = merge([tmp_path / "a", tmp_path / "b", ran[-1]], tmp_path / "whole")
+    assert {name: one for name, one in decided(whole.rows).items() if not name.endswith("3")} == decided(ran[0].rows)
     timed = {row["seed"]: row["latency_n"] is not None for row in whole.rows if row["estimator"] == "ridge"}
     assert timed == {1: True, 2: True, 3: False}
+    store = Store(tmp_path / "whole")
+    assert json.loads(rendered(table_of(store, shown_rows(store)), "json"))[0]["seeds"] == [1, 2, 3]
 
 
-@pytest.mark.parametrize(
-    ("choice", "says"),
-    [
-        (EngineChoice("in-process", jobs=2), "--jobs 2"),
-    ],
-)
-def test_choices_that_do_not_go_together_are_refused(tmp_path, choice, says):
-    with pytest.raises(UsageError, match=says):
-        run_matrix(matrix(), Store(tmp_path / "out"), choice=choice)
+def test_choices_that_do_not_go_together_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="--jobs 2"):
+        run_matrix(matrix(), Store(tmp_path / "out"), choice=EngineChoice("in-process", jobs=2))
     assert not (tmp_path / "out").exists()

@@ -9,8 +9,6 @@ from contextlib import closing
 from dataclasses import fields
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
@@ -118,21 +116,15 @@ def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
     assert not Store(tmp_path).troubles
 
 
-@pytest.fixture(scope="module")
-def sound(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("sound")
-    with Store(folder).hold() as store:
+def test_a_changed_byte_is_seen(tmp_path):
+    with Store(tmp_path).hold() as store:
         kept(store, "a")
-    return file_of(folder, "a").read_bytes(), folder / "changed.h5"
-
-
-@given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(1, 255))
-def test_a_changed_byte_is_seen(sound, place, flip):
-    content, path = sound
-    where = int(place * len(content))
-    path.write_bytes(content[:where] + bytes([content[where] ^ flip]) + content[where + 1 :])
-    with pytest.raises(FormatError):
-        read_cell(path)
+    path = file_of(tmp_path, "a")
+    content = path.read_bytes()
+    for place in range(0, len(content), 97):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        with pytest.raises(FormatError):
+            read_cell(path)
 
 
 def _older(index, folder):
@@ -167,16 +159,9 @@ def test_without_a_usable_index_the_rows_are_the_same(tmp_path, what):
     INDEXES[what](tmp_path / "results.sqlite", tmp_path)
     found = Store(tmp_path)
     assert json.dumps(found.rows()) == json.dumps(before), "tables are the same to the byte"
-    assert found.troubles == ()
+    assert found.troubles == []
     assert found.finished(key("a")) == before[0]
     assert found.provenance(before[0]["made_by"]) == {"cpu": "a"}
-
-
-def test_what_is_no_plain_data_writes_nothing(tmp_path):
-    with Store(tmp_path).hold() as store:
-        with pytest.raises(ValueError, match="JSON"):
-            kept(store, "a", chosen={"alpha": math.nan})
-        assert list((tmp_path / "cells").iterdir()) == []
 
 
 def test_what_a_recording_says_is_read_again_when_its_file_has_changed(tmp_path):
@@ -209,11 +194,7 @@ def test_a_second_run_is_refused_reading_is_not_and_what_was_half_written_goes(t
         with pytest.raises(FolderError, match=r"Another run"), Store(tmp_path).hold():
             pass
         assert [one["cell"] for one in Store(tmp_path).rows()] == ["a"]
-
-
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
-    (tmp_path / "out").write_text("a file")
-    with pytest.raises(FolderError, match="cannot be written"), Store(tmp_path / "out").hold():
+    with pytest.raises(FolderError, match="written"), Store(file_of(tmp_path, "a")).hold():
         pass
 
 
@@ -230,14 +211,15 @@ def test_the_queries_of_the_page_run(tmp_path):
             found.append(database.execute(query).fetchall())
     means, stopped, everything = found
     assert means == [("icub", "force", "mean", 6.0, 2)]
-    assert stopped == [("b/1", "failed", "a test says so")]
+    assert stopped == [("b/1", "failed", "untested")]
     assert {line[0] for line in everything} == {"a/10", "a/2", "b/1"}
     assert {json.loads(line[-1])["cell"] for line in everything} == {"a/10", "a/2", "b/1"}
 
 
-def test_a_cell_that_is_read_back_otherwise_is_none(tmp_path, monkeypatch):
+def test_no_plain_data_and_what_is_read_back_otherwise_leave_no_file(tmp_path, monkeypatch):
     monkeypatch.setattr(STORE, "replace_file", lambda path, content: path.write_bytes(content[:-1]))
     with Store(tmp_path).hold() as store:
-        with pytest.raises(FolderError, match="read back"):
-            kept(store, "a")
+        for error, chosen in ((ValueError, {"alpha": math.nan}), (FolderError, {})):
+            with pytest.raises(error, match=r"JSON|read back"):
+                kept(store, "a", chosen=chosen)
         assert (store.finished(key("a")), store.rows(), list(tmp_path.glob("cells/*"))) == (None, [], [])

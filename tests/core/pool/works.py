@@ -81,7 +81,7 @@ def eats():
 
 def hangs(begun=None):
     """Wait for ever; tell in a file who does."""
-    print("about to hang", flush=True)
+    print("hanging", flush=True)
     if begun is not None:
         aside = Path(f"{begun}.aside")
         aside.write_text(str(os.getpid()))
@@ -90,9 +90,9 @@ def hangs(begun=None):
 
 
 def prints():
-    print("from Python")
-    os.write(1, b"from below\n")
-    os.system("echo from a child")
+    print("Python")
+    os.write(1, b"below\n")
+    os.system("echo child")
     raise ValueError("printed")
 
 
@@ -102,8 +102,9 @@ def floods():
 
 
 def feeds_a_child():
-    """Have a process of its own take memory, which no limit of this process can refuse."""
-    subprocess.run([sys.executable, "-c", "import threading; a = bytearray(200 * 2**20); threading.Event().wait()"])
+    """Have a process below one of its own take 100 MB, which no limit of this process can refuse."""
+    code = "import threading; a = bytearray(100 * 2**20); threading.Event().wait()"
+    subprocess.run(f"{sys.executable} -c '{code}'; true", shell=True)
 
 
 def forks():

@@ -10,6 +10,8 @@ import time
 from importlib import metadata
 from pathlib import Path
 
+import psutil
+
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.gather import _commit, gather, host_id
 from tactbench.core.provenance.source import source_digest
@@ -49,7 +51,7 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
     assert getpass.getuser() not in found.values()
     assert found["distributions"]["numpy"] == metadata.version("numpy")
     assert (found["seed"], found["host"]) == (1, host_id())
-    assert found["memory_mb"] > 0
+    assert found["memory_mb"] == psutil.virtual_memory().total >> 20
     assert found["threads"] == os.environ["OMP_NUM_THREADS"]
 
 

@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.files import named_file, replace_file, try_lock, utf8_json
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
-from tactbench.core.provenance.source import digest_of, provenance_id
+from tactbench.core.provenance.source import digest_of
 
 if TYPE_CHECKING:
     from tactbench.core.samples import Answers
@@ -32,12 +31,12 @@ _FULL = {
 }
 
 
-class Store:
+class Store(Index):
     """A result folder at the path `folder`, which need not exist: :meth:`hold` makes it."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
+        super().__init__(folder)
+        self._made_by: tuple[str, Mapping[str, Any]] = ("", {})
         self.superseded: list[str] = []
         """Cells whose latest answer was replaced, by this object, with one from other recordings."""
 
@@ -67,18 +66,10 @@ class Store:
         finally:
             os.close(lock)
 
-    @cached_property
-    def _files(self) -> Index:
-        return Index(self.folder)
-
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Set the provenance of cells that are written from now on, and return its id."""
-        self._provenance = provenance_id(provenance), provenance
-        return self._provenance[0]
-
-    def finished(self, key: str) -> Row | None:
-        """Return the row of a finished cell by its key, or None."""
-        return self._files.finished(key)
+        self._made_by = digest_of(json.dumps(provenance, sort_keys=True))[:16], provenance
+        return self._made_by[0]
 
     def keep(
         self, row: Mapping[str, Any], sections: Mapping[str, Any], answers: Mapping[str, Answers] | None = None
@@ -93,14 +84,14 @@ class Store:
             If the row is not plain data; nothing is written.
         """
         # Texts of a row are UTF-8 from here on, whatever was given: a name of a file may hold any byte.
-        text = json.dumps({**row, "made_by": self._provenance[0]}, allow_nan=False, ensure_ascii=False)
+        text = json.dumps({**row, "made_by": self._made_by[0]}, allow_nan=False, ensure_ascii=False)
         kept: Row = json.loads(utf8_json(text))
-        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
+        self._write(CellFile(kept, sections, self._made_by[1], answers=answers or {}))
         return kept
 
     def reuse(self, row: Row) -> None:
         """Make a finished cell the latest one of its name in `row`."""
-        latest = self._files.files_of(row["cell"])
+        latest = self._files_of(row["cell"])
         if not latest or latest[0][1] != row["key"]:
             cell = read_cell(self.file_of(row))
             self._write(replace(cell, row={**cell.row, "cell": row["cell"]}))
@@ -111,53 +102,33 @@ class Store:
         with writing(self.folder):
             replace_file(path, content)
             _check_written(path, cell)
-            before = self._files.files_of(cell.row["cell"])
-            old = self._files.finished(before[0][1]) if before else None
+            before = self._files_of(cell.row["cell"])
+            old = self.finished(before[0][1]) if before else None
             if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
                 self.superseded.append(cell.row["cell"])
             for name, _key, status in before:
-                if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
+                if status != "done" and name != path.name:  # superseded; finished ones stay for other versions
                     (path.parent / name).unlink(missing_ok=True)
-                    self._files.drop(name)
-        self._files.put(path, cell)
+                    self._drop(name)
+        self._put(path, cell)
 
     def file_of(self, row: Mapping[str, Any]) -> Path:
         """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
         return self.folder / "cells" / f"{row.get('key') or digest_of(row['cell'])}.h5"
-
-    @property
-    def troubles(self) -> tuple[str, ...]:
-        """Sentences about files of this folder that could not be read."""
-        return tuple(self._files.troubles)
-
-    def rows(self) -> list[Row]:
-        """Return the latest row of every cell, in the order of their names."""
-        return list(self._files.latest())
 
     def cell(self, row: Mapping[str, Any]) -> CellFile:
         """Return the content of the file of a row's cell; raises FormatError if it cannot be read."""
         return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
-        """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""
+        """Return the answers of a finished cell by role; none for a cell that is missing or cannot be read."""
         path = self.folder / "cells" / f"{key}.h5"
         try:
             return dict(read_cell(path).answers) if path.is_file() else {}
         except FormatError as error:
-            if str(error) not in self._files.troubles:
-                self._files.troubles.append(str(error))
+            if str(error) not in self.troubles:
+                self.troubles.append(str(error))
             return {}
-
-    def provenance(self, name: str) -> dict[str, Any]:
-        """Return which software computed a cell where, by the id in ``row["made_by"]``; empty if not known."""
-        return self._files.provenance(name)
-
-    def about(self, recording: Path) -> Mapping[str, Any]:
-        """Return content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
-
-        The scene is None for recordings without a planned scene, such as an imported table.
-        """
-        return self._files.recording(recording, _read_recording)
 
     def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
         """Return each recording that a row names, in its order, and its file, or None if it is not there."""
@@ -168,15 +139,6 @@ class Store:
         """Return `path` relative to the folder where it lies inside, so that the folder may be moved."""
         inside = path.is_relative_to(self.folder)
         return str(path.relative_to(self.folder)) if inside else str(path.resolve())
-
-
-def _read_recording(path: Path) -> dict[str, Any]:
-    from tactbench.core.recording.reader import open_recording
-
-    with open_recording(path) as recording:
-        meta = recording.meta
-        scene = meta.scene.name if meta.scene else None
-        return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
 
 
 def _check_written(path: Path, cell: CellFile) -> None:
