@@ -9,10 +9,9 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -118,7 +117,6 @@ class DataSet:
         address, files = self.source.address, self.source.files
         there = pooch.create(path=self.files, base_url=address or "file:///", registry=dict(files))
         pooch.get_logger().setLevel("WARNING")
-        download = None if copy is None else _copying(copy)
         progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
         for name in files:
             origin = address + name if copy is None else str(copy / name)
@@ -128,7 +126,7 @@ class DataSet:
                     hint=f"Name a folder that holds it as `root` (--root DIR), or put it into {self.files}.",
                 )
             try:
-                there.fetch(name, downloader=download)
+                there.fetch(name, downloader=None if copy is None else partial(_take, copy / name))
             except ValueError as error:  # pooch's word for a digest that differs
                 raise MissingRecordingError(
                     f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
@@ -220,10 +218,6 @@ def copy_in(root: Path | None, first: str) -> Path | None:
     return next((place for place in places if (place / first).is_file()), None)
 
 
-def _copying(copy: Path) -> Callable[[str, str, Any], None]:
-    """Return a downloader for pooch that copies a file from `copy`."""
-
-    def download(url: str, output_file: str, there: Any) -> None:
-        shutil.copyfile(copy / url.removeprefix(there.base_url), output_file)
-
-    return download
+def _take(path: Path, _url: str, output_file: str, _there: Any) -> None:
+    """Download a file for pooch by copying `path`."""
+    shutil.copyfile(path, output_file)

@@ -28,9 +28,6 @@ Words = dict[str, str]
 BROKEN_LINKS = "are links to files that are not here"
 OTHER_CASE = "have an ending in another case"
 LINKED_FOLDERS = "are linked folders, which ** does not search"
-FOLDERS = "are folders"
-APPLE_DOUBLE = "are what macOS keeps beside other files (AppleDouble)"
-NO_TABLES = (FOLDERS, APPLE_DOUBLE)
 _SAME_GROUPS = "Give both `path` expressions the same named groups."
 
 
@@ -58,10 +55,8 @@ class RawRecording(NamedTuple):
     files: tuple[str, ...]
 
 
-def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
+def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
     """Return the files that belong together, in the order of the first table's paths, and sentences about the others.
-
-    The sentences of the second result are about files that make no recording, those of the third about no tables.
 
     Raises
     ------
@@ -73,11 +68,9 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
     found: dict[str, list[FoundFile]] = {}
     left_out: list[str] = []
-    no_tables: list[str] = []
     for name, source in mapping.tables.items():
         found[name], notes = _matching(name, source, root)
-        for obstacle, note in notes.items():
-            (no_tables if obstacle in NO_TABLES else left_out).append(note)
+        left_out += notes.values()
     lead, *others = found
     shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
     by_words: dict[tuple[str, ...], list[FoundFile]] = {}
@@ -105,7 +98,7 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
         used = {one.files[name].shown for one in sets}
         alone = [file.shown for file in found[name] if file.shown not in used]
         left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
-    return sets, tuple(left_out), tuple(no_tables)
+    return sets, tuple(left_out)
 
 
 def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
@@ -198,10 +191,9 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
     kinds: dict[str, list[str]] = {"": []}
     matches = root.glob(source.files.removesuffix(ending) + in_any_case)
     for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
-        obstacle = (
-            BROKEN_LINKS if not path.exists() else FOLDERS if not path.is_file() else
-            OTHER_CASE if not path.name.endswith(ending) else APPLE_DOUBLE if path.name.startswith("._") else ""
-        )  # fmt: skip
+        if path.is_dir() or path.name.startswith("._"):  # which macOS keeps beside other files (AppleDouble)
+            continue
+        obstacle = BROKEN_LINKS if not path.exists() else "" if path.name.endswith(ending) else OTHER_CASE
         kinds.setdefault(obstacle, []).append(path.relative_to(root).as_posix())
     if "**" in source.files:
         above, _, inside = source.files.partition("**")

@@ -84,7 +84,7 @@ class ImportReport:
     left_out: tuple[str, ...] = ()
     """A sentence for each kind of files that match a pattern and make no recording."""
     unused: tuple[str, ...] = ()
-    """A sentence for each kind of matches that are no tables, and one for the columns of a table that are not used."""
+    """A sentence for each table with columns that are not used."""
 
     @property
     def rows(self) -> int:
@@ -128,7 +128,7 @@ def import_tables(
     loaded = load_yaml(mapping, Mapping)
     sensor, streams = sensor_of(loaded)
     tasks = _tasks_text(loaded)
-    sets, left_out, unused = find(loaded, mapping.parent if root is None else root)
+    sets, left_out = find(loaded, mapping.parent if root is None else root)
     beside: list[Finding] = []
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
@@ -161,7 +161,7 @@ def import_tables(
             _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for one in sets for file in one.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(unused_columns(shapes)))
 
 
 def import_log(

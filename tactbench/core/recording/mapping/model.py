@@ -30,7 +30,7 @@ class Tabular(Frozen):
 
     header: bool
     """True: the first line names the columns. False: the file has no such line, and columns are numbered from 0."""
-    skiprows: Annotated[int, Field(ge=0)] | tuple[Annotated[int, Field(ge=0)], ...] = 0
+    skiprows: int | tuple[int, ...] = 0
     """Lines that are left out: how many at the beginning, or the list of their places, counted from 0."""
     no_sample: tuple[str, ...] = ()
     """Texts that stand for "no sample" where a cell holds nothing else, for example "" or "NA"."""

@@ -58,6 +58,7 @@ def test_columns_by_name_ranges_and_combinations(tables):
     """)
     taxels = read(report)[1]["taxels"]
     assert [channel.name for channel in taxels.spec.channels] == ["ff.1", "ff.2", "th.1", "th.2"]
+    assert {(one.sign, one.lower, one.upper, one.rest) for one in taxels.spec.channels} == {(0, None, None, None)}
     assert taxels.data.tolist() == [[1, 2, 3, 4], [5, 6, 7, 8]]
     assert taxels.annotations["slipped"].tolist() == ["stable", "slipped"]
     assert taxels.t_ns is None
