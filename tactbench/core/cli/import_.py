@@ -44,8 +44,8 @@ def command(
     `inspect` finds an error in what was written.
     """
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.recording.mapping.importing import import_log
     from tactbench.core.recording.mapping import import_tables
+    from tactbench.core.recording.mapping.importing import import_log
     from tactbench.core.spec.scene import Role
     from tactbench.core.study.progress import progress
 

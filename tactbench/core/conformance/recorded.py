@@ -23,13 +23,11 @@ from tactbench.core.conformance.streams import (
 )
 from tactbench.core.recording.datasets import DataSet, copy_in
 from tactbench.core.recording.mapping import model
-from tactbench.core.recording.mapping.channels import sensor_of
 from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.samples import StreamData
-from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
 LARGEST_N, MOST_N = 1000.0, 100.0  # largest and median force: a press of 10 N in gram-force reads 1020
 LOADED = 0.2  # share of the largest force from which a sample counts as loaded
