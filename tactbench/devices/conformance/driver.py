@@ -27,7 +27,7 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, Quality, StreamData
+from tactbench.core.samples import Block, FloatArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
@@ -452,38 +452,46 @@ def driver_follows_a_step(subject: Subject) -> None:
     the rows of a block in the order of their time.
     """
     _skip_motor(subject)
-    step_s = math.inf
+    steps_s = list[float]()
 
     def senses(t_s: float) -> dict[str, float]:
-        return {one.name: _reading(one, STEP[int(t_s >= step_s)])[0] for one in every}
+        return {one.name: _reading(one, STEP[sum(t_s >= step_s for step_s in steps_s) % 2])[0] for one in every}
 
     with emulated(subject, started=False) as (opened, _):
         every, slowest = opened.channels(), opened.slowest_hz
     row_s = max(0.01, 1 / slowest)
     with emulated(subject, senses=senses) as (opened, devices):
-        blocks = opened.blocks(READ_S)
-        batches = {
-            name: max(len(one.data) for one in blocks if one.stream == name) for name in {b.stream for b in blocks}
-        }
-        step_s = 1e-9 * opened.clock() + 4 * row_s
-        devices.advance(opened.clock() + round(8e9 * row_s))  # the step lies in the middle of a block
-        blocks += opened.blocks(READ_S + 2 * LAG_ROWS / slowest)
-    stated = getattr(subject.spec, "link_delay", None)
-    for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
-        low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
-        found = ((good(stream) - low) / (high - low)).mean(axis=1)  # from 0 before the step to 1 after it
-        whole = np.isfinite(found)
-        found, before = found[whole], np.flatnonzero(found[whole] < STEP[1])
-        if stream.t_ns is None or len(before) in (0, len(found)):  # a stream that gives no steady level
+        steps_s.append(1e-9 * opened.clock() + READ_S)
+        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / slowest)
+        steps_s.append(1e-9 * opened.clock() + 4 * row_s)
+        devices.advance(opened.clock() + round(8e9 * row_s))  # this step lies in the middle of a block
+        after = opened.blocks(READ_S)
+    stated, streams = getattr(subject.spec, "link_delay", None), opened.driver.streams
+    late = joined("driver.read", streams, after)
+    for name, stream in joined("driver.read", streams, blocks).items():
+        found, times = _shares(stream)
+        before = np.flatnonzero(found < STEP[1])
+        if len(before) in (0, len(found)):  # a stream that gives no steady level
             continue
         if abs(found[0]) > STEP[0]:
             fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
-        if (np.diff(found) < -STEP[0]).any():
-            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
-        late_s = float(stream.t_ns[whole][min(int(before[-1]) + 1, len(found) - 1)]) * 1e-9 - step_s
-        rows_s = (LAG_ROWS + batches.get(name, 0)) * float(np.ptp(stream.t_ns)) * 1e-9 / len(found)
-        if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
+        late_s = float(times[min(int(before[-1]) + 1, len(found) - 1)]) - steps_s[0]
+        batch = max(len(one.data) for one in blocks if one.stream == name)
+        if late_s > (LAG_ROWS + batch) * np.ptp(times) / len(found) + LAG_S + (
+            0.0 if stated is None else stated.to("s")
+        ):
             fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
+        if (np.diff(_shares(late[name])[0]) > STEP[0]).any():
+            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
+
+
+def _shares(stream: StreamData) -> tuple[FloatArray, FloatArray]:
+    """Return the rows that have readings: (n,) shares of the way between the levels of a step, and (n,) times [s]."""
+    low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
+    found = np.asarray(((good(stream) - low) / (high - low)).mean(axis=1))
+    whole = np.isfinite(found) & (stream.t_ns is not None)
+    times = np.zeros(len(found)) if stream.t_ns is None else 1e-9 * stream.t_ns
+    return found[whole], times[whole]
 
 
 @check("sensor", "device", needs="driver-reads")
