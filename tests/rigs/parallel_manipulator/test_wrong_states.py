@@ -122,6 +122,7 @@ SCHEDULES = {
     "loaded while zeroed": (5.0, {"reads": loaded(2.4, 3.0)}, {}, "not arm"),
     "load that falls off at the touch": (5.0, {"reads": loaded_until_touched(2.4)}, {}, "no touch"),
     "pull that ends at the touch": (5.0, {"reads": loaded_until_touched(-2.4)}, {}, "N are left"),
+    "0.3 mm deeper": (5.0, {"slip": lambda at_m: 0.3e-3}, {}, ""),
     "2.2 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 2.2e-3}, {}, "before"),
     "3 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 3e-3}, {}, "refused"),
     "3 mm less deep": (5.0, {"slip": lambda at_m: -3e-3}, {}, "no touch"),
