@@ -1,8 +1,6 @@
-"""What moves emulated devices: the latest sample of a scene, and nothing pressed outside it."""
+"""The samples of a scene for emulated devices: the latest one of each channel, and no load outside the scene."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -18,29 +16,15 @@ def stream(name, *channels):
     return StreamSpec(name=name, channels=tuple(ChannelSpec(name=channel, kind="other") for channel in channels))
 
 
-@dataclass
-class Scene:
-    """Two channels every 100 ms for a second, pressed from 300 ms on; the force ten times as often."""
-
-    streams: tuple = (stream("taxels", "a", "b"),)
-    reference: tuple = (stream("force_torque", "fz"),)
-    blocks: list = field(default_factory=list)
-
-    def __post_init__(self):
-        rows = np.arange(10)
-        data = np.column_stack([rows, 10 * rows]).astype(np.uint16)
-        for part in (slice(0, 4), slice(4, 10)):  # blocks end where they like
-            self.blocks.append(Block("taxels", rows[part] * 100 * MS, data[part]))
-        rows = np.arange(100)
-        self.blocks.append(Block("force_torque", rows * 10 * MS, np.maximum(0.0, rows - 30.0)[:, None]))
-
-    def __iter__(self):
-        return iter(self.blocks)
-
-
 def scene_samples(duration_s, **more):
-    scene = Scene()
-    return SceneSamples((*scene.streams, *scene.reference), scene, duration_s, **more)
+    """Two channels every 100 ms for a second, pressed from 300 ms on; the force ten times as often."""
+    rows, often = np.arange(10), np.arange(100)
+    data = np.column_stack([rows, 10 * rows]).astype(np.uint16)
+    taxels = [Block("taxels", rows[part] * 100 * MS, data[part]) for part in (slice(0, 4), slice(4, 10))]
+    force = Block("force_torque", often * 10 * MS, np.maximum(0.0, often - 30.0)[:, None])
+    return SceneSamples(
+        (stream("taxels", "a", "b"), stream("force_torque", "fz")), [*taxels, force], duration_s, **more
+    )
 
 
 @pytest.fixture
