@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tactbench.core.recording.reader import content_digest, open_recording
+from tactbench.core.recording.reader import content_digest, open_recording, read_meta
 from tactbench.core.recording.writer import RecordingWriter, write_recording
 from tactbench.core.samples import Block
 from tests.core.recording.conftest import about
@@ -58,7 +58,7 @@ def test_round_trip(made):
         for name, expected in (("x.h5", {}), ("y.h5", labels)):
             with open_recording(Path(folder) / name) as recording:
                 recording.verify()
-                assert recording.meta == meta
+                assert recording.meta == read_meta(recording.path) == meta
                 read = recording.read("taxels")
             # Bytes, not values: NaN and the sign of zero must survive too.
             assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
