@@ -299,10 +299,8 @@ def _mappings_beside(module: ModuleType) -> bool:
 
 def _stated_version(module: str) -> object:
     """Return the version that the source of a module states, else this one: its import may fail in another version."""
-    spec = find_spec(module)
-    if spec is None or not (spec.origin or "").endswith(".py"):
-        return hookspecs.API_VERSION
-    text = Path(str(spec.origin)).read_text(encoding="utf-8", errors="replace")
+    origin = getattr(find_spec(module), "origin", None)
+    text = Path(origin).read_text(encoding="utf-8", errors="replace") if origin else ""
     found = re.search(r"^TACTBENCH_API\b[^=\n]*=\s*(\d+)", text, re.MULTILINE)
     return int(found[1]) if found else hookspecs.API_VERSION
 

@@ -64,7 +64,7 @@ class SheetTable(Frozen):
         rows, angle = np.array(self.value_mm), np.abs(np.degrees(angle_rad))
         around = np.stack([np.interp(angle, self.angle_deg, row) for row in rows])
         place = np.interp(x_mm, self.x_mm, np.arange(rows.shape[0], dtype=np.float64))
-        low = np.minimum(place.astype(np.intp), max(rows.shape[0] - 2, 0))
+        low = np.minimum(place.astype(np.intp), rows.shape[0] - 2)
         share = (place - low)[:, None]
         above = np.minimum(low + 1, rows.shape[0] - 1)
         found: npt.NDArray[np.float64] = (1.0 - share) * around[low] + share * around[above]

@@ -227,8 +227,8 @@ class TaskSpec(TaskFields):
             raise ValueError(f"there is no metric {self.metric!r}; did you mean {' or '.join(close)}?")
         if self.kind == "classification" and isinstance(self.target, ChannelTarget):
             raise ValueError(
-                f"a channel of kind {self.target.kind} is a number: classes have a LabelTarget, or a SlipTarget of "
-                "frames; kind: regression predicts numbers"
+                f"a channel of kind {self.target.kind} is a number: give classes or a threshold (a LabelTarget or a "
+                "SlipTarget), or kind: regression"
             )
         vector = isinstance(self.target, VectorTarget)
         if vector and self.kind != "regression":

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import RigError, UsageError
-from tactbench.core.plugins.registry import installed
-from tactbench.core.plugins.rigs import failing_as, load_rig_file
+from tactbench.core.plugins.registry import Owned, Registry, installed
+from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_context
+from tactbench.core.spec.rig import EffectDescriptor
 from tests.conftest import Verbs
 
 
@@ -24,6 +25,17 @@ def test_emulated_devices_of_a_rig_file_sense_the_simulated_rig_unless_it_states
     path = tmp_path / "rig.yaml"
     path.write_text(f"rig: bench\nsensors: {{icub: {{link: emulated}}}}\n{stated}\n", encoding="utf-8")
     assert load_rig_file(path, installed()).emulation.physics == physics
+
+
+def test_effects_of_other_packages_are_candidates_by_name_only():
+    registry = Registry()
+    for name, module in (("own", "tactbench.rigs.made"), ("foreign", "acme")):
+        effect = EffectDescriptor(name=name, title=name, where="a:b", called_for="a:b")
+        registry.effects.add(Owned(effect, module, "made", "1"))
+    context = rig_context(registry)
+    assert [[one.name for one in several] for several in (context.effects, context.named_effects)] == [
+        ["own"], ["foreign"],
+    ]  # fmt: skip
 
 
 def recordings(verbs, out, *more, plugins=("patching",)):
