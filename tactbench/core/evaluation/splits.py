@@ -168,10 +168,9 @@ def _can(name: str, data: Dataset) -> bool:
     number = shots(name)
     if number is not None:
         return len(training_sessions(data)) >= number and any(meta.role == "test" for meta in data.metas)
-    tables = [data.tables[place] for place in _open_to_folds(data)]
-    if any(name not in table.groups for table in tables):
-        return False  # rows of no known group could be related to either side
-    return len(_sizes(data, _open_rows(data), name)) >= 2
+    # Rows of no known group could be related to either side.
+    known = all(name in data.tables[place].groups for place in _open_to_folds(data))
+    return known and len(_sizes(data, _open_rows(data), name)) >= 2
 
 
 def used_rows(assignments: Sequence[Assignment]) -> Mask:
@@ -198,8 +197,9 @@ def training_sessions(data: Dataset) -> list[str]:
     """
     tested = {meta.session for meta in data.metas if meta.role == "test"}
     found = {meta.session for meta in data.metas if meta.role == "train"} - tested
-    return sorted(found, key=lambda name: [(part.isdigit(), int(part) if part.isdigit() else 0, part)
-                                           for part in re.split(r"([0-9]+)", name)])  # fmt: skip
+    # Every second part of a name is a number.
+    return sorted(found, key=lambda name: [int(part) if place % 2 else part
+                                           for place, part in enumerate(re.split(r"([0-9]+)", name))])  # fmt: skip
 
 
 def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_one: bool = False) -> list[Assignment]:

@@ -118,3 +118,8 @@ def test_neighbours_with_different_places_are_separated(seed):
     for one, other in itertools.pairwise(sorted(rows, key=lambda row: row["score"])):
         if found[one["cell"]].place < found[other["cell"]].place:
             assert difference(one, other).verdict == "better"
+    beaten = {(one["cell"], other["cell"]) for one, other in itertools.permutations(rows, 2)
+              if one["score"] < other["score"] and difference(one, other).verdict == "better"}  # fmt: skip
+    for name, rank in found.items():
+        assert rank.low == min(1 + sum(loser == name for _, loser in beaten), rank.place)
+        assert rank.high == max(10 - sum(winner == name for winner, _ in beaten), rank.place)
