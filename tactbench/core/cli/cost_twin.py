@@ -51,7 +51,7 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
     points = [one for one in found if not isinstance(one, Skipped)]
     records = _records(points, [one for one in found if isinstance(one, Skipped)])
     print_records(records, shape, title=study.title, columns=_COLUMNS)
-    remark(f"{study.reference}\nenough: the quickest whose error is below a third of the noise.")
+    remark(study.reference)
     with writable(out), styled():
         out.mkdir(parents=True, exist_ok=True)
         replace_file(out / f"{name}.json", (json_text(records, indent=1) + "\n").encode())
@@ -62,13 +62,13 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
 
 def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[dict[str, Any]]:
     """Return every point as a flat record with its time, its error and its settings."""
-    from tactbench.core.cost.precision import diagrams, precise, quickest_enough
+    from tactbench.core.cost.precision import diagrams, precise
 
     found = []
     for group in diagrams(points).values():
-        best, enough = precise(group), quickest_enough(group)
+        best = precise(group)
         for point in group:
-            marks = ("default",) * point.default + ("front",) * (point in best) + ("enough",) * (point is enough)
+            marks = ("default",) * point.default + ("front",) * (point in best)
             found.append({
                 "sensor": point.subject, "observable": point.observable, "marks": ", ".join(marks), "way": point.label,
                 "rung": point.rung or None, "seconds": point.seconds, "error_rms": point.error,

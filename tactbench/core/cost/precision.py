@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 
@@ -63,9 +62,3 @@ def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoin
 def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
     """Return the front of one diagram: error against seconds."""
     return front(points, lambda point: (point.seconds, point.error))
-
-
-def quickest_enough(points: Sequence[CostPoint]) -> CostPoint | None:
-    """Return the quickest point whose error is below a third of the noise; None: no such point, or no noise stated."""
-    enough = [point for point in points if math.isfinite(point.floor) and point.error < SHARE * point.floor]
-    return min(enough, key=lambda point: point.seconds, default=None)

@@ -213,10 +213,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
         least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
         notes.append(f"{pair.row['task']}: {apart.method}; {same}{least}.")
         if pair.folds:
-            notes.append(
-                f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
-                "for a claim about estimators trained anew."
-            )
+            notes.append(f"p folds: {pair.folds.method}, for a claim about estimators trained anew.")
     return tuple(dict.fromkeys(notes))
 
 

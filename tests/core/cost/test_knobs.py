@@ -1,6 +1,5 @@
 """What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
 
-import math
 from collections import Counter
 
 import numpy as np
@@ -9,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.cost.knobs import Setting, measure, quick_estimator, settings_of
-from tactbench.core.cost.precision import precise, quickest_enough
+from tactbench.core.cost.precision import precise
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import stated_delay_ms
@@ -163,10 +162,3 @@ def test_no_point_beats_the_front_and_the_front_beats_all_others(pairs):
     for one in best:
         assert not any(other.seconds < one.seconds and other.error <= one.error for other in points)
     assert [one.error for one in best] == sorted((one.error for one in best), reverse=True)
-
-
-def test_the_quickest_point_that_will_do():
-    quick, default, slow = cost_point(0.1, 0.5), cost_point(0.2, 0.05, default=True), cost_point(1.0, 0.01)
-    assert quickest_enough([quick, default, slow]) is default
-    assert quickest_enough([quick, cost_point(0.2, 0.2)]) is None
-    assert quickest_enough([cost_point(1, 1, floor=math.inf)]) is None, "no noise is stated"
