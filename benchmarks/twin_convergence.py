@@ -53,7 +53,7 @@ def pressed(spec: SensorSpec, contact: Contact, fidelity: Fidelity):
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     medium = medium_of(skin, grid)
     core = (lambda below: with_core(below, skin)) if medium.has_core else None
-    gap = gap_mm(grid, contact, skin.sheet.outer_radius.to("mm"))
+    gap = gap_mm(grid, contact, skin.sheet)
     press = Press(medium, gap, contact, core=core, tolerance=fidelity.newton_tolerance)
     factory = load_object(f"tactbench.sensors.{spec.name}.transduction:build")
     names = [channel.name for channel in spec.channels("taxel")]

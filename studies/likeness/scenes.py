@@ -24,7 +24,7 @@ from tactbench.plugin.simulation import FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid, surface_of
+from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build
 
 SEED, RATE_HZ, WHY = 3, 100.0, "scene of the comparison with real recordings"
@@ -57,12 +57,12 @@ class Bench:
 
     def cap(self, radius_mm: float, x_mm: float, s_mm: float) -> np.ndarray:
         """Return the gap to a cap, or a flat surface of infinite radius, at a place of the sheet."""
-        return gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), *surface_of(self.sheet))
+        return gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self.sheet)
 
     def plate(self, normal: np.ndarray) -> np.ndarray:
         """Return the gap to a flat plate that faces the finger from a direction, measured along that."""
         # On the cylinder the tangent plane at the midline is level: `below` is a height but for a constant.
-        surface = around_mm(self.grid, Contact(math.inf, 0.0, 0.0), *surface_of(self.sheet))
+        surface = around_mm(self.grid, Contact(math.inf, 0.0, 0.0), self.sheet)
         height = sum(component * place for component, place in zip(normal, surface, strict=True))
         return np.max(height) - height
 

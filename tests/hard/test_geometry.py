@@ -17,7 +17,9 @@ SHEET = SkinSheet(
 )
 GRID = skin_grid(SHEET)
 INF = st.just(math.inf)
-FINGERS = st.one_of(INF, st.floats(4, 100))
+FINGERS = st.one_of(INF, st.floats(4, 100)).map(
+    lambda radius: SHEET.model_copy(update={"outer_radius": assumed(radius, "mm", "t")})
+)
 CAPS, PLACES = st.floats(1, 1e9), st.floats(-9, 9)
 
 

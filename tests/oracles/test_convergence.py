@@ -29,7 +29,7 @@ def _changes(spec, radius, factor=1.0, conduction=2, *, table=False):
     core = (lambda below: with_core(below, skin)) if medium.has_core else None
     press = Press(
         medium,
-        gap_mm(grid, contact, skin.sheet.outer_radius.to("mm"), skin.sheet.dome, skin.sheet.relief),
+        gap_mm(grid, contact, skin.sheet),
         contact,
         core=core,
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactbench.plugin import FloatArray, Indenter, RigError
-from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
+from tactbench.plugin.simulation import Dome, SkinGrid, SkinSheet
 from tactbench.rigs.twin.shapes import Shape, sag_mm
 
 STEEPEST = 1.0
@@ -73,26 +73,15 @@ def radius_mm(indenter: Indenter) -> float:
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
-def surface_of(sheet: SkinSheet) -> tuple[float, Dome | None, SheetTable | None]:
-    """Return outer radius [mm], dome and relief of a sheet: the finger's surface as :func:`gap_mm` takes it."""
-    return outer_radius_mm(sheet), sheet.dome, sheet.relief
-
-
-def gap_mm(
-    grid: SkinGrid,
-    contact: Contact,
-    outer_radius_mm: float = math.inf,
-    dome: Dome | None = None,
-    relief: SheetTable | None = None,
-) -> FloatArray:
-    """Return the (nx, ns) gap between the unloaded skin and the indenter at zero approach.
+def gap_mm(grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None) -> FloatArray:
+    """Return the (nx, ns) gap between unloaded skin and indenter at zero approach; a skin without a sheet is flat.
 
     The press axis is the skin's normal at the contact, on the dome as on the cylinder. The fall-away of the finger
     (``2 Ro sin²(theta/2)`` on the cylinder) and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written so that
     nothing cancels: R = 1e9 mm and a flat surface agree to rounding. With a tilt the smallest gap is subtracted, so
     that the approach keeps its origin. With a relief the press axis stays that normal.
     """
-    x, y, fall = around_mm(grid, contact, outer_radius_mm, dome, relief)
+    x, y, fall = around_mm(grid, contact, sheet)
     own = sag_mm(x**2 + y**2, contact.radius_mm) if contact.shape is None else contact.shape.height_mm(x, y)
     gap: FloatArray = fall + own
     if contact.tilt_x or contact.tilt_s:
@@ -102,11 +91,7 @@ def gap_mm(
 
 
 def around_mm(
-    grid: SkinGrid,
-    contact: Contact,
-    outer_radius_mm: float = math.inf,
-    dome: Dome | None = None,
-    relief: SheetTable | None = None,
+    grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return where the finger's surface lies as seen from the contact: along, across, and below its tangent plane.
 
@@ -116,9 +101,9 @@ def around_mm(
     sin(theta), -Ro cos(phi) cos(theta))`` with ``sin(phi) = (X - start) / Ro`` on the dome; the differences
     to the contact's own point are turned by its meridian angle.
     """
-    if math.isinf(outer_radius_mm):
+    if sheet is None or math.isinf(outer_radius_mm(sheet)):
         return grid.x_mm[:, None] - contact.x_mm, grid.s_mm[None, :] - contact.s_mm, np.zeros((1, 1))
-    radius = outer_radius_mm
+    radius, dome, relief = outer_radius_mm(sheet), sheet.dome, sheet.relief
     theta = (grid.s_mm[None, :] - contact.s_mm) / radius
     phi, axial = _meridian(grid.x_mm[:, None], radius, dome)
     (phi0,), (axial0,) = _meridian(np.array([contact.x_mm]), radius, dome)

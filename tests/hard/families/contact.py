@@ -12,7 +12,7 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
 
 BALANCE = 1e-8
 """Relative force balance: a sum over thousands of cells rounds at 1e-13, and the law shall hold far from its edge."""
@@ -45,7 +45,7 @@ def press_of(skin, contact, cells=None):
             return with_core(medium, skin)
 
     sheet = skin.sheet
-    gap = gap_mm(grid, contact, outer_radius_mm(sheet), sheet.dome, sheet.relief)
+    gap = gap_mm(grid, contact, sheet)
     return Press(medium_of(skin, grid), gap, contact, core=core)
 
 
@@ -160,8 +160,8 @@ def flat_is_a_huge_cap(case):
     huge = Contact(case.decades(1e9, 1e15), flat.x_mm, flat.s_mm)
     load = case.decades(1e-6, 100.0)
     first, second = (lawful(case, press_of(skin, one), [load])[0].depth_mm for one in (flat, huge))
-    grid, outer = skin_grid(skin.sheet), outer_radius_mm(skin.sheet)
-    apart = float(np.abs(gap_mm(grid, flat, outer) - gap_mm(grid, huge, outer)).max())
+    grid, sheet = skin_grid(skin.sheet), skin.sheet
+    apart = float(np.abs(gap_mm(grid, flat, sheet) - gap_mm(grid, huge, sheet)).max())
     r2 = grid.x_mm.size**2 * grid.cell_mm[0] ** 2 + grid.s_mm.size**2 * grid.cell_mm[1] ** 2
     case.holds(apart <= r2 / (2 * huge.radius_mm) * 1.01 + 1e-13, f"the cap sags by {apart!r} mm")
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")

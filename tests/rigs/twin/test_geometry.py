@@ -36,17 +36,24 @@ def test_the_cap_is_a_sphere(radius, x0, s0):
 DOME = Dome(start=q(0.0))
 
 
+def finger(radius, **more):
+    return SHEET.model_copy(update={"outer_radius": q(radius), **more})
+
+
+FINGER = finger(8.0, dome=DOME)
+
+
 def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
     # One sphere octant, pressed half a radian up its meridian.
     grid = SkinGrid(x_mm=np.linspace(-4.0, 8.0, 25), s_mm=np.linspace(-8.0, 8.0, 33))
     x = 8.0 * math.sin(0.5)
-    gap = gap_mm(grid, Contact(math.inf, x, 0.0), 8.0, DOME)
+    gap = gap_mm(grid, Contact(math.inf, x, 0.0), FINGER)
     on_it = grid.x_mm >= 0
     expected = 2 * 8.0 * np.sin((np.arcsin(grid.x_mm[on_it] / 8.0) - 0.5) / 2) ** 2
     np.testing.assert_allclose(gap[on_it, 16], expected, atol=1e-14)
     # Around the pole of the press axis a sphere looks the same to all sides.
     around = SkinGrid(x_mm=np.array([x, x + 0.1]), s_mm=grid.s_mm)
-    sphere = gap_mm(around, Contact(math.inf, x, 0.0), 8.0, DOME)[0]
+    sphere = gap_mm(around, Contact(math.inf, x, 0.0), FINGER)[0]
     ring = 8.0 * math.cos(0.5)
     np.testing.assert_allclose(sphere, math.cos(0.5) * 2 * ring * np.sin(grid.s_mm / 16.0) ** 2, atol=1e-14)
 
@@ -57,8 +64,8 @@ def relief(value):
 
 def test_an_even_relief_is_a_thinner_finger():
     grid = SkinGrid(x_mm=np.linspace(-4.0, 0.0, 9), s_mm=np.linspace(-8.0, 8.0, 33))
-    thinner = gap_mm(SkinGrid(x_mm=grid.x_mm, s_mm=grid.s_mm * 7.5 / 8.0), Contact(20.0, -2.0, 0.75), 7.5)
-    with_relief = gap_mm(grid, Contact(20.0, -2.0, 0.8), 8.0, DOME, relief(0.5))
+    thinner = gap_mm(SkinGrid(x_mm=grid.x_mm, s_mm=grid.s_mm * 7.5 / 8.0), Contact(20.0, -2.0, 0.75), finger(7.5))
+    with_relief = gap_mm(grid, Contact(20.0, -2.0, 0.8), finger(8.0, dome=DOME, relief=relief(0.5)))
     np.testing.assert_allclose(with_relief, thinner, atol=1e-14)
 
 
@@ -82,7 +89,7 @@ def test_a_table_that_is_none_is_refused(wrong):
 def test_the_cylinder_does_not_know_of_the_dome_and_joins_it_smoothly():
     grid = SkinGrid(x_mm=np.linspace(-4.0, 4.0, 801), s_mm=np.linspace(-3.0, 3.0, 31))
     contact = Contact(12.0, -1.0, 0.4)
-    with_dome, without = gap_mm(grid, contact, 8.0, DOME), gap_mm(grid, contact, 8.0)
+    with_dome, without = gap_mm(grid, contact, FINGER), gap_mm(grid, contact, finger(8.0))
     np.testing.assert_array_equal(with_dome[grid.x_mm <= 0], without[grid.x_mm <= 0])
     slope = np.diff(with_dome, axis=0) / 0.01
     # The radius of curvature stays above the cap's and the finger's in series: no kink where they meet.
@@ -92,7 +99,7 @@ def test_the_cylinder_does_not_know_of_the_dome_and_joins_it_smoothly():
 @given(x=st.floats(-4.0, 7.0), s=st.floats(-6.0, 6.0), radius=st.floats(2.0, 1e9))
 def test_nothing_of_a_finger_stands_above_the_contact_on_it(x, s, radius):
     grid = SkinGrid(x_mm=np.linspace(-4.0, 8.0, 25), s_mm=np.linspace(-8.0, 8.0, 33))
-    gap = gap_mm(grid, Contact(radius, x, s), 8.0, DOME)
+    gap = gap_mm(grid, Contact(radius, x, s), FINGER)
     assert np.isfinite(gap).all()
     # Convex: rounding of millimetres is all that may stand above the tangent plane.
     assert gap.min() >= -1e-13

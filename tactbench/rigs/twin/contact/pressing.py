@@ -30,7 +30,7 @@ from tactbench.plugin.simulation import (
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, Press, whole_skin
 from tactbench.rigs.twin.fidelity import Fidelity
-from tactbench.rigs.twin.geometry import gap_mm, skin_grid, surface_of
+from tactbench.rigs.twin.geometry import gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 Read = Callable[[SkinState], FloatArray]
@@ -66,7 +66,7 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
     """Return the solver of the loads of `run`; raises as :func:`pressed`."""
     skin = run.skin
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    gap = gap_mm(grid, run.contact, *surface_of(skin.sheet))
+    gap = gap_mm(grid, run.contact, skin.sheet)
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress
 

@@ -11,7 +11,7 @@ from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.plugin.simulation import SkinGrid, SkinSheet
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import STEEPEST, around_mm, surface_of
+from tactbench.rigs.twin.geometry import STEEPEST, around_mm
 from tactbench.rigs.twin.shapes import RIM
 
 RESOLVED_CELLS = 3.0
@@ -36,7 +36,7 @@ def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
     """
     if not force_n > 0 or math.isinf(press.contact.radius_mm):
         return
-    along, across, _ = around_mm(press.medium.grid, press.contact, *surface_of(sheet))
+    along, across, _ = around_mm(press.medium.grid, press.contact, sheet)
     if np.any(press(force_n).pressure_mpa[np.hypot(along, across) >= RIM * press.contact.radius_mm] > 0):
         raise RigError(
             f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks in past its rim: what would "
@@ -67,7 +67,7 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
     found |= _too_deep(press.medium, press(force).deflection_mm)
-    along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, *surface_of(sheet)))
+    along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, sheet))
     along, across = along[pressure > 0], across[pressure > 0]
     radius, reach = press.contact.radius_mm, float(np.hypot(along, across).max())
     if shape is not None:

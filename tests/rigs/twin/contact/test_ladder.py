@@ -26,9 +26,9 @@ def _recorded(sensor, simulation, radius=10.0):
         return acquisition, data
 
 
-def local(skin, outer_mm=math.inf):
+def local(skin):
     grid, contact = skin_grid(skin.sheet), Contact(10.0, 0.0, 0.0)
-    return LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact, outer_mm), contact)
+    return LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact, skin.sheet), contact)
 
 
 def thin(poisson):

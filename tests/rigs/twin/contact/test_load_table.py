@@ -25,7 +25,7 @@ def _press(spec, radius, x, s=0.0):
 def _prototype(prototype, radius):
     below, skin = prototype("biotac", core=False)
     contact = Contact(radius, -5.0, 0.0)
-    gap = gap_mm(below.grid, contact, skin.sheet.outer_radius.to("mm"))
+    gap = gap_mm(below.grid, contact, skin.sheet)
     return Press(below, gap, contact, core=lambda made: with_core(made, skin))
 
 

@@ -27,7 +27,7 @@ def medium(name, *, core=True):
 
 def solver(name, radius, x, s=0.0, *, core=True):
     made, sheet = medium(name, core=core), SPECS[name].skin.sheet
-    gap = gap_mm(made.grid, Contact(radius, x, s), sheet.outer_radius.to("mm"), sheet.dome, sheet.relief)
+    gap = gap_mm(made.grid, Contact(radius, x, s), sheet)
     return NewtonSolver(made, gap)
 
 
@@ -52,8 +52,7 @@ PRESSURES = {
 def test_reference_values(prototype, case, depths):
     name, radius = case
     made, skin = prototype(name)
-    outer = skin.sheet.outer_radius.to("mm")
-    press = NewtonSolver(made, gap_mm(made.grid, Contact(radius, PLACES[name], 0.0), outer))
+    press = NewtonSolver(made, gap_mm(made.grid, Contact(radius, PLACES[name], 0.0), skin.sheet))
     vector = None
     for i, (force, depth) in enumerate(zip((0.1, 0.5, 1.0, 2.0, 5.0), depths, strict=True)):
         found = press.solve(force, vector)

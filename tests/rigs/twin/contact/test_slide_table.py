@@ -76,7 +76,7 @@ def _readings(sensor, scene):
 
 def test_between_the_nodes_the_table_gives_what_the_states_give():
     grid, contact = skin_grid(SKIN.sheet), Contact(8.0, 0.0, 0.0)
-    press, along = Press(medium_of(SKIN, grid), gap_mm(grid, contact, math.inf), contact), tangential_of(SKIN, grid)
+    press, along = Press(medium_of(SKIN, grid), gap_mm(grid, contact), contact), tangential_of(SKIN, grid)
     transducer = build(SPEC, grid, CHANNELS)
 
     def read(state):

@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.press import Press, at_rest
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
-from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.partial_slip import sliding_stiffness
 from tests.oracles.layers import bonded_layer
 
@@ -76,7 +76,7 @@ def presses(specs):
     for name, skin in (("layer", layer), ("foam", specs["icub"].skin), ("shell", specs["biotac"].skin)):
         grid, sheet = skin_grid(skin.sheet), skin.sheet
         contact = Contact(10.0, float(grid.x_mm.mean()), 0.0)
-        gap = gap_mm(grid, contact, outer_radius_mm(sheet), sheet.dome, sheet.relief)
+        gap = gap_mm(grid, contact, sheet)
         made[name] = (Press(medium_of(skin, grid), gap, contact), tangential_of(skin, grid))
     return made
 
