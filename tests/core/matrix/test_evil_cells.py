@@ -60,18 +60,17 @@ def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
     assert ends == {("made", "done", False), ("icub", "failed", True)}
 
 
-@pytest.mark.parametrize(("shelf", "press"), [("sh\udce9lf", "press.h5"), ("shelf", "pr\udce9ss.h5")])
-def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_path, shelf, press):
-    presses(tmp_path / shelf)
-    (tmp_path / shelf / "press-0.h5").rename(tmp_path / shelf / press)
-    verbs, asked = Verbs(tmp_path, here=True), [shelf if word == "shelf" else word for word in ANY_SENSOR]
+def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_path):
+    shelf = presses(tmp_path / "sh\udce9lf")
+    (shelf / "press-0.h5").rename(shelf / "pr\udce9ss.h5")
+    verbs, asked = Verbs(tmp_path, here=True), [shelf.name if word == "shelf" else word for word in ANY_SENSOR]
     rows = json.loads(verbs(*asked, "--out", "out").stdout)
     assert {row["status"] for row in rows} == {"done"}
     written = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cells").iterdir()}
     verbs(*asked, "--out", "out")
     assert {path: path.stat().st_mtime_ns for path in written} == written, "all were found finished"
     store = Store(tmp_path / "out")
-    assert {path for row in store.rows() for _, path in store.recordings(row)} == {*(tmp_path / shelf).iterdir()}
+    assert {path for row in store.rows() for _, path in store.recordings(row)} == {*shelf.iterdir()}
     for suffix in ("txt", "tex", "parquet", "xlsx"):
         verbs("leaderboard", "out", "--to", f"board.{suffix}")
     (tmp_path / "out" / "leaderboard.csv").read_text(encoding="utf-8")

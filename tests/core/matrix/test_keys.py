@@ -9,6 +9,7 @@ from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import source_digest
+from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
 
 CELL = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 5)
@@ -80,3 +81,11 @@ def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):
         for seed in (1, 2)
     }
     assert len(found) == 16
+
+
+def test_a_recording_of_real_devices_counts_its_rig_file_and_no_code(keys, monkeypatch):
+    monkeypatch.setattr("tactbench.core.matrix.keys.sources_of", None)
+    scene = installed().tasks["force"].spec.scenes[0].scene
+    files = [RigFile.model_validate({"version": 1, "rig": "bench", "sensors": {"icub": {"link": link}}})
+             for link in ("/dev/ttyUSB0", "/dev/ttyUSB1")]  # fmt: skip
+    assert len({keys.of_recording("icub", "bench", scene, "train", 1, file) for file in files}) == 2
