@@ -135,6 +135,8 @@ def test_arrays_in_files_of_their_own_with_channels_on_a_grid(tables):
 def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
     np.save(tables.data / "x_a.npy", np.zeros((4, 2, 3, 5)))
     tables.refused("labels_a.npy", text=NPY)
+    np.save(tables.data / "labels_a.npy", np.zeros(3))
+    tables.refused("labels_{fold}.npy", "(3,)", text=NPY)
     np.save(tables.data / "labels_a.npy", np.array([0, 1, 2, "a"], dtype=object))
     tables.refused("x_a.npy", "allow_pickle", text=NPY)
     np.savez(tables.data / "x.npz", X=np.array([0, "a"], dtype=object))
