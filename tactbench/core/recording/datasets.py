@@ -126,7 +126,7 @@ class DataSet:
                     hint=f"Name a folder that holds it as `root` (--root DIR), or put it into {self.files}.",
                 )
             try:
-                there.fetch(name, downloader=None if copy is None else partial(_take, copy / name))
+                there.fetch(name, downloader=None if copy is None else partial(_copy_file, copy / name))
             except ValueError as error:  # pooch's word for a digest that differs
                 raise MissingRecordingError(
                     f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
@@ -218,6 +218,6 @@ def copy_in(root: Path | None, first: str) -> Path | None:
     return next((place for place in places if (place / first).is_file()), None)
 
 
-def _take(path: Path, _url: str, output_file: str, _there: Any) -> None:
+def _copy_file(path: Path, _url: str, output_file: str, _there: Any) -> None:
     """Download a file for pooch by copying `path`."""
     shutil.copyfile(path, output_file)

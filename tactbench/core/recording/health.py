@@ -142,7 +142,7 @@ def examine(recording: Recording) -> list[Finding]:
         Errors (an evaluation would fail or be wrong), warnings (a score may suffer), infos (a reader should know).
         Empty: nothing was found.
     """
-    found = list(_whole(recording))
+    found = list(_meta_findings(recording))
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
     streams: dict[str, _Stream] = {}
     for name in recording.stream_names:
@@ -165,7 +165,7 @@ def examine(recording: Recording) -> list[Finding]:
     for name, stream in streams.items():
         for other, reference in streams.items():
             if name in own and other not in own:
-                found.extend(_late(stream, reference))
+                found.extend(_lags(stream, reference))
     return sorted(found, key=lambda finding: get_args(Severity).index(finding.severity))
 
 
@@ -184,7 +184,7 @@ def marking(recording: Recording) -> list[Finding]:
     return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
 
 
-def _whole(recording: Recording) -> Iterator[Finding]:
+def _meta_findings(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
         yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}")
@@ -278,7 +278,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
         yield Finding("rate", "warning", f"{stream} runs at {rate:.4g} Hz{nominal}{looks}", stream)
 
 
-def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
+def _lags(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
     forces = np.array([one.kind == "force" for one in reference.spec.channels])
     own, other = sensor.t_ns, reference.t_ns
     if own is None or other is None or not forces.any() or all(one.kind != "taxel" for one in sensor.spec.channels):

@@ -78,8 +78,8 @@ def test_a_force_of_coarse_steps_may_stand_still_without_load_and_one_that_never
     coarse = lambda t_s: np.round(np.clip(t_s - 3.0, 0.0, 4.0), 1)[:, None]  # noqa: E731
     assert lacking(force=coarse, frozen_s=1.0) == []
     noisy = np.random.default_rng(2).normal(size=(SECONDS * HZ, 1))
-    hung = lambda t_s: np.where((t_s[:, None] >= 4.0) & (t_s[:, None] < 7.0), 4.0, noisy)  # noqa: E731
-    assert lacking(force=hung) == [("force", "frozen", 2.99, 4)]
+    hung = lambda t_s: np.where((t_s[:, None] >= 1.0) & (t_s[:, None] < 9.9), 4.0, noisy)  # noqa: E731
+    assert lacking(force=hung) == [("force", "frozen", 8.89, 1)]
     dead = lambda t_s: np.zeros((len(t_s), 1))  # noqa: E731
     assert lacking(force=dead) == [("force", "frozen", 9.99, 0)]
 

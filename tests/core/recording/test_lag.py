@@ -64,7 +64,8 @@ def test_a_lag_is_found_with_its_uncertainty(lag, rate_hz, force_hz):
 @pytest.mark.parametrize(("drift", "seconds"), [(0.005, 20), (-0.02, 20), (0.002, 130)])
 def test_a_clock_that_runs_fast_or_slow_is_found_at_the_end(drift, seconds):
     times, taxels, force_times, force = clocked(drift=drift, lag=0.02, seconds=seconds)
-    first, last = windows(times, force_times)[-1][" at the end"]
+    (begun, half), (first, last) = windows(times, force_times)[-1].values()
+    assert half - begun == last - first
     own, other = (slice(*np.searchsorted(one, (first, last + 1))) for one in (times, force_times))
     late, _ = find_lag(times[own], taxels[own], force_times[other], force[other])
     middle = (first + last) / 2e9

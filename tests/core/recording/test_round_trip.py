@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tactbench.core.recording.format import canonical
 from tactbench.core.recording.reader import content_digest, open_recording, read_meta
 from tactbench.core.recording.writer import RecordingWriter, write_recording
 from tactbench.core.samples import Block
@@ -71,6 +72,7 @@ def test_round_trip(made):
 
 def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):
     """Blocks, the name and what was computed on the way do not matter; one bit of one reading does."""
+    assert canonical({"b": [1.5, "ä"], "a": 1}) == '{"a":1,"b":[1.5,"ä"]}'
 
     def digest(name, data, step):
         later = {"provenance": {"host": name}, "drawn": {"solver_residual": 1e-9 * step}}

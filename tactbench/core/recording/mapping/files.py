@@ -96,8 +96,8 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
         raise MappingError(left_out[-1], hint=_SAME_GROUPS)
     for name in others:
         used = {one.files[name].shown for one in sets}
-        alone = [file.shown for file in found[name] if file.shown not in used]
-        left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
+        unmatched = [file.shown for file in found[name] if file.shown not in used]
+        left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in unmatched]
     return sets, tuple(left_out)
 
 

@@ -156,7 +156,7 @@ def import_tables(
         if tasks and not replace and target.exists() and target.read_text(encoding="utf-8") != tasks:
             raise MappingError(f"{target} exists already and declares other tasks.", hint=_OTHERWISE)
         _write_tasks(folder, tasks)
-        placed = _fitting(made, out, replace=replace)
+        placed = _in_place(made, out, replace=replace)
         with writable(out):
             _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
@@ -318,7 +318,7 @@ def _write(
     for name, stream in streams.items():
         written[name], doubtful = samples(stream, raw.tables[stream.source.table], clocks.get(stream.source.table))
         found += doubtful
-    found += _given_away(meta, written)
+    found += _target_copies(meta, written)
     findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
     missing = {
         channel.name: int(lacking)
@@ -335,7 +335,7 @@ def _write(
     return Imported(path, meta, max(len(table) for table in raw.tables.values()), missing, findings)
 
 
-def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator[Finding]:
+def _target_copies(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator[Finding]:
     """Yield a finding for each channel of the sensor that is a copy of a force or torque of the reference."""
     reference = {one.name for one in meta.reference}
     sensed, forces = [], []
@@ -403,7 +403,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
     return known[given]
 
 
-def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
+def _in_place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
     """Return the recordings with their place in `out`; those that lie there already are not moved."""
     for one in made:
         target = out / one.path.name

@@ -135,8 +135,13 @@ def test_arrays_in_files_of_their_own_with_channels_on_a_grid(tables):
 def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
     np.save(tables.data / "x_a.npy", np.zeros((4, 2, 3, 5)))
     tables.refused("labels_a.npy", text=NPY)
+    np.save(tables.data / "labels_a.npy", np.zeros(3))
+    tables.refused("labels_{fold}.npy", "(3,)", text=NPY)
     np.save(tables.data / "labels_a.npy", np.array([0, 1, 2, "a"], dtype=object))
     tables.refused("x_a.npy", "allow_pickle", text=NPY)
+    np.savez(tables.data / "x.npz", X=np.array([0, "a"], dtype=object))
+    read_as = {"format": "npz", "array": "X", "axes": ["row"]}
+    tables.refused("x.npz", "allow_pickle", tables__table__files="x.npz", tables__table__read=read_as)
 
 
 def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
@@ -144,10 +149,13 @@ def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
     lines = [[row * 0.01, row, row / 3, {3: None, 4: "NA", 5: "nan"}.get(row, 1), row * 1.5] for row in range(20)]
     for line in (["measured on a Monday"], [], ["t", "a", "b", "c", "f"], *lines):
         book.active.append(line)
+    book.create_sheet("notes")
     book.save(tables.data / "press.xlsx")
+    several = {"format": "xlsx", "header": True}
+    tables.refused("Sheet, notes", tables__table__files="*.xlsx", tables__table__read=several)
     report = tables.run(
         tables__table__files="*.xlsx", streams__taxels__channels__0__columns=["a", "b", "c"],
-        tables__table__read={"format": "xlsx", "header": True, "skiprows": 2, "no_sample": ["", "NA"]},
+        tables__table__read={**several, "sheet": "Sheet", "skiprows": 2, "no_sample": ["", "NA"]},
     )  # fmt: skip
     taxels = read(report)[1]["taxels"].data
     assert np.array_equal(taxels[:, 0], np.arange(20))
