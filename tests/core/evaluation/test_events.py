@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.event_answers import Scored
+from tactbench.core.evaluation.event_answers import EventRules, Scored
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
@@ -19,6 +19,7 @@ from tactbench.plugin import Summary
 from tactbench.tasks import slip, slip_state
 from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
+from tests.core.events.made import policy
 
 RATE, LATENCY, MOVED = "false alarms per minute", "onset latency p50 ms", "displacement at detection p50 mm"
 BALANCED, COMPUTE = "frame balanced accuracy", "compute s per s of signal"
@@ -167,7 +168,9 @@ def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_fro
     labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
     reference = SlipReference(t_ns, some, some, some, {1.0: labels}, False)
     assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
-    truth = Scored(0, np.array([20, 25, 30]), some[:3], reference).truth()
+    scored = Scored(0, np.array([20, 25, 30]), np.array([0.0, 0.5, 0.0]), reference)
+    truth = scored.truth()
+    assert EventRules(policy(), 1.0, 0.5, 5).curve([scored]).threshold.tolist() == [1.0, np.inf], "0.5 is reached"
     assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
 
 
