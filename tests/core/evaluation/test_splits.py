@@ -31,6 +31,12 @@ def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(t
     assert set(test.sum(axis=0)) == ({0, 1} if split == "in-session" else {1})
 
 
+def test_two_groups_that_train_are_kept_apart_where_parameters_are_chosen_too(tmp_path):
+    data = load_dataset(force_task(), sessions(tmp_path, n=20))
+    inner = inner_splits(data, make_splits(data, "session", 0)[0])
+    assert [[np.unique(data.recording[rows]).tolist() for rows in pair] for pair in inner] == [[[2], [1]], [[1], [2]]]
+
+
 def filtered(data, fold, k):
     """The training rows of a fold behind the window, not scaled."""
     return part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
