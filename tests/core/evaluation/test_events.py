@@ -16,7 +16,7 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
 from tactbench.core.spec.events import AREA_PER_MINUTE
 from tactbench.plugin import Summary
-from tactbench.tasks import slip, slip_state
+from tactbench.tasks import slip
 from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
 from tests.core.events.made import policy
@@ -183,14 +183,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     assert late[LATENCY] == pytest.approx(at_once[LATENCY] + spent_ms)
     same = ("events", "misses", "precision", "recall", RATE)
     assert [late[name] for name in same] == [at_once[name] for name in same]
-
-
-def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
-    states = slip_state.SPEC.model_copy(update={"scenes": (), "target": TASK.target})
-    found = [framed(load_dataset(task, paths[:1]), task, RULES, REGISTRY.estimators["slip-forest"]).tables[0].y
-             for task in (TASK, states)]  # fmt: skip
-    assert set(found[1]) == {0, 1, 2}
-    np.testing.assert_array_equal(found[0], found[1] == 2)
 
 
 @pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])
