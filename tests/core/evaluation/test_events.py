@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.event_answers import Scored
+from tactbench.core.evaluation.event_answers import EventRules, Scored
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
@@ -16,9 +16,10 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
 from tactbench.core.spec.events import AREA_PER_MINUTE
 from tactbench.plugin import Summary
-from tactbench.tasks import slip, slip_state
+from tactbench.tasks import slip
 from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
+from tests.core.events.made import policy
 
 RATE, LATENCY, MOVED = "false alarms per minute", "onset latency p50 ms", "displacement at detection p50 mm"
 BALANCED, COMPUTE = "frame balanced accuracy", "compute s per s of signal"
@@ -167,7 +168,9 @@ def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_fro
     labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
     reference = SlipReference(t_ns, some, some, some, {1.0: labels}, False)
     assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
-    truth = Scored(0, np.array([20, 25, 30]), some[:3], reference).truth()
+    scored = Scored(0, np.array([20, 25, 30]), np.array([0.0, 0.5, 0.0]), reference)
+    truth = scored.truth()
+    assert EventRules(policy(), 1.0, 0.5, 5).curve([scored]).threshold.tolist() == [1.0, np.inf], "0.5 is reached"
     assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
 
 
@@ -180,14 +183,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     assert late[LATENCY] == pytest.approx(at_once[LATENCY] + spent_ms)
     same = ("events", "misses", "precision", "recall", RATE)
     assert [late[name] for name in same] == [at_once[name] for name in same]
-
-
-def test_a_frame_is_labelled_by_its_state_or_by_whether_it_slips(paths):
-    states = slip_state.SPEC.model_copy(update={"scenes": (), "target": TASK.target})
-    found = [framed(load_dataset(task, paths[:1]), task, RULES, REGISTRY.estimators["slip-forest"]).tables[0].y
-             for task in (TASK, states)]  # fmt: skip
-    assert set(found[1]) == {0, 1, 2}
-    np.testing.assert_array_equal(found[0], found[1] == 2)
 
 
 @pytest.mark.parametrize("protocol", ["karl2016", "deployable@k=3", "deployable@every=2"])

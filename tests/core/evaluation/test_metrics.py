@@ -21,6 +21,8 @@ def test_regression_metrics_are_those_of_scikit_learn(seed, n, offset):
     assert METRICS["rmse"].of(y, p) == pytest.approx(reference.root_mean_squared_error(y, p), rel=1e-9)
     assert METRICS["mae"].of(y, p) == pytest.approx(mae, rel=1e-9)
     assert METRICS["r2"].of(y, p) == pytest.approx(reference.r2_score(y, p), rel=1e-6)
+    some = METRICS["r2"].rows(y, p, 0)[: n // 2 + 1].sum(axis=0)
+    assert METRICS["r2"].score(some, 0) == pytest.approx(reference.r2_score(y[: n // 2 + 1], p[: n // 2 + 1]), rel=1e-5)
     # Each difference is (d, -d).
     assert METRICS["mean_euclidean_error"].of(np.c_[y, p], np.c_[p, y]) == pytest.approx(np.sqrt(2) * mae, rel=1e-9)
 

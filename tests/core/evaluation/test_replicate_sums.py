@@ -8,7 +8,7 @@ import pytest
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 
-from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
+from .made import evaluated, force_task, grasps, label_task, ramp, record
 
 
 def again(result):
@@ -16,16 +16,6 @@ def again(result):
     kept = json.loads(json.dumps(dict(result.replicates)))
     n_classes = len(result.classes)
     return float(METRICS[result.metric].score(tables_of([kept], result.metric, n_classes)[0].sum(axis=0), n_classes))
-
-
-@pytest.mark.parametrize("metric", ["rmse", "mae", "r2"])
-def test_the_score_of_a_number_follows_from_the_sums(tmp_path, metric):
-    result = evaluated(force_task(metric=metric), sessions(tmp_path, n=90))
-    assert again(result) == pytest.approx(result.score, rel=1e-12)
-    kept = result.replicates
-    assert (kept["unit"], kept["names"], kept["strata"]) == ("session", ["a", "b", "c"], None)
-    folds = {name.removeprefix("fold "): score for name, score in result.scores.items() if name.startswith("fold ")}
-    assert dict(zip(kept["names"], kept["own"], strict=True)) == pytest.approx(folds)
 
 
 @pytest.mark.parametrize("metric", ["accuracy", "balanced_accuracy", "macro_f1"])

@@ -1,6 +1,7 @@
 """Splits keep apart what they say, windows never cross, and a leak is stamped."""
 
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from hypothesis import strategies as st
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
-from tactbench.core.evaluation.sets import FeatureScale, causal_mean, keep, part
-from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits
+from tactbench.core.evaluation.sets import FeatureScale, apart, causal_mean, keep, part
+from tactbench.core.evaluation.splits import Assignment, choose_split, inner_splits, make_splits
 from tactbench.plugin import ChannelTarget, Summary
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
@@ -28,6 +29,12 @@ def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(t
     train, test = (np.array([getattr(fold, name) for fold in folds]) for name in ("train", "test"))
     assert not (train & test).any()
     assert set(test.sum(axis=0)) == ({0, 1} if split == "in-session" else {1})
+
+
+def test_two_groups_that_train_are_kept_apart_where_parameters_are_chosen_too(tmp_path):
+    data = load_dataset(force_task(), sessions(tmp_path, n=20))
+    inner = inner_splits(data, make_splits(data, "session", 0)[0])
+    assert [[np.unique(data.recording[rows]).tolist() for rows in pair] for pair in inner] == [[[2], [1]], [[1], [2]]]
 
 
 def filtered(data, fold, k):
@@ -73,6 +80,15 @@ def test_the_causal_mean_is_that_of_a_naive_loop(k, lengths, offset, seed):
                       for t in range(len(X))])  # fmt: skip
     # At an offset of 1e8 a double has 1.5e-8 between neighbours; sums of centred values add a few of these.
     np.testing.assert_allclose(causal_mean(X, k, segment), naive, atol=1e-12 if offset == 0 else 1e-7)
+
+
+@given(st.integers(1, 7), st.integers(1, 4), st.lists(st.booleans(), min_size=1, max_size=30))
+def test_no_training_window_has_a_row_of_a_test_window_and_all_others_stay(window, step, tested):
+    test = np.array(tested)
+    data = SimpleNamespace(parted=lambda rows: [rows])
+    found = apart(Assignment("x", ~test, test), data, window, step).train
+    near = [any(abs(place - other) * step < window for other in np.flatnonzero(test)) for place in range(len(test))]
+    assert found.tolist() == (~test & ~np.array(near)).tolist()
 
 
 def test_a_shuffled_split_is_stamped_and_taken_unasked_only_where_nothing_else_fits(tmp_path):
