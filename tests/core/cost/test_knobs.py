@@ -128,6 +128,8 @@ def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, 
 
 def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
     task = registry.tasks["slip-sequence"].spec
+    knobs = {one.knob for one in settings_of(task, [registry.estimators["forest"]], "deployable")}
+    assert "window k" not in knobs
     with pytest.raises(NotApplicable, match="single samples"):
         load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
 

@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.formats import rendered
+from tactbench.core.leaderboard.formats import rendered, write_tables
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.latex import tex
@@ -90,3 +90,8 @@ def test_without_its_library_a_format_says_what_to_install(monkeypatch, library,
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(UsageError, match=rf"tactbench\[{shape}\]"):
         written(shape, [row()])
+
+
+def test_tables_that_cannot_be_written_are_refused_with_the_folder(tmp_path):
+    with pytest.raises(UsageError, match="missing"):
+        write_tables(build_table([row()]), tmp_path / "missing")

@@ -2,6 +2,7 @@
 
 import pytest
 
+from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, record_of, tables_of, with_declared
 from tactbench.core.spec.matrix import ComparisonChoice
 
@@ -33,6 +34,12 @@ def test_two_sensors_are_compared_estimator_by_estimator():
     assert table.lines[0][-1] == "a better"
     (record, _) = map(record_of, found)
     assert record["difference"] == pytest.approx(record["score_a"] - record["score_b"])
+
+
+def test_a_name_that_is_not_there_is_refused_with_those_of_its_kind():
+    for names in (("a", "c"), ("c", "a")):
+        with pytest.raises(UnknownNameError, match="'c'"):
+            comparisons([answered(), answered("b")], *names)
 
 
 @pytest.mark.parametrize(

@@ -72,6 +72,7 @@ def test_the_table_has_a_line_for_each_set_with_range_source_and_order(store):
     alone = lines["placement_scatter_mm", "0"]
     assert (alone["range"].split(" … "), alone["source"]) == (["0", "0.5"], "assumed")
     assert alone["biotac: change"].startswith("+0.100 (+0.")
+    assert lines["offset_scale", "0"]["range"].startswith("biotac 0 "), "the sensors' ranges differ"
     both = lines["offset_scale, placement_scatter_mm", "0, 0"]
     assert both["order"].endswith(TURNS)
     assert lines["since_power_on_s", "0"]["icub"] == "–"
