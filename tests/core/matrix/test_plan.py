@@ -1,10 +1,13 @@
 """The cells of a matrix, and those that ``--probe`` adds."""
 
+from dataclasses import replace
+
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.matrix.plan import cell_of, plan_cells
 from tactbench.core.matrix.plan_recordings import request_key
+from tactbench.core.matrix.solve import opening
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
 
@@ -82,3 +85,10 @@ def test_probes_keep_apart_what_the_cell_keeps_apart(asked, probes):
 def test_a_split_in_time_cannot_be_probed_by_itself():
     with pytest.raises(UsageError, match="probe"):
         curvature("deployable", "in-session")
+
+
+@pytest.mark.parametrize(("timed", "latency_n"), [(True, 20), (False, None)])
+def test_a_row_gives_its_cell_back(timed, latency_n):
+    cell = replace(plan({"name": "force"})[0], timed=timed)
+    row = opening(cell, installed().tasks["force"].spec)
+    assert cell_of({**row, "status": "done", "latency_n": latency_n}) == cell
