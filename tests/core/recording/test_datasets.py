@@ -135,9 +135,6 @@ def test_a_package_of_data_sets_alone_is_a_plugin_and_a_broken_one_costs_itself_
         _ = dataset_called("broken").source
     with pytest.raises(UnknownNameError):
         dataset_called("eflesh-norm")
-    broken, pad = (run_checks(one, isolated=False) for one in subjects_named(registry, "only"))
-    assert (broken.kind, broken.name, broken.ok) == ("dataset", "broken", False)
-    assert [one.where for one in pad.failed] == ["source.tasks"]
 
 
 def test_one_that_cannot_be_had_costs_its_own_rows_of_a_task_that_both_declare(tmp_path, server):
