@@ -137,11 +137,17 @@ def _in_the_way(index, folder):
     index.mkdir()
 
 
+def _of_another_version(index, _):
+    with closing(sqlite3.connect(index)) as database:
+        database.executescript("DROP TABLE cells; CREATE TABLE cells (file, cell, key, seed); PRAGMA user_version = 2")
+
+
 INDEXES = {
     "lost": lambda index, _: index.unlink(),
     "damaged": lambda index, _: index.write_bytes(b"no database" * 1000),
     "damaged in the middle": lambda index, _: index.write_bytes(index.read_bytes()[:4096] + b"\xff" * 4096 * 20),
     "older than the files": _older,
+    "of another version": _of_another_version,
     "cannot be written": _in_the_way,
 }
 
@@ -162,6 +168,11 @@ def test_without_a_usable_index_the_rows_are_the_same(tmp_path, what):
     assert found.troubles == []
     assert found.finished(key("a")) == before[0]
     assert found.provenance(before[0]["made_by"]) == {"cpu": "a"}
+    if (index := tmp_path / "results.sqlite").is_dir():
+        return
+    assert Store(tmp_path).rows() == before
+    with closing(sqlite3.connect(index)) as database:
+        assert database.execute("SELECT count(*) FROM cells").fetchone() == (3,), "it was made anew"
 
 
 def test_what_a_recording_says_is_read_again_when_its_file_has_changed(tmp_path):
