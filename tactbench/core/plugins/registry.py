@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -193,7 +193,7 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
     return registry
 
 
-@lru_cache(maxsize=1)
+@cache
 def installed() -> Registry:
     """Return the registry of this process, loaded once."""
     return load_registry()
@@ -316,7 +316,7 @@ def _check_api_version(module: str, written_for: object) -> None:
     )
 
 
-@lru_cache
+@cache
 def _owner(distribution: Distribution | None) -> tuple[str, str]:
     """Return the name and the version of a distribution, which are read from a file."""
     return ("unknown", "") if distribution is None else (distribution.name, distribution.version)
