@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 
 from tactbench.core.plugins.registry import installed, load_registry
-from tactbench.core.provenance.gather import _commit, gather, host_id
+from tactbench.core.provenance.gather import _commit, gather, host_id, usable_cores
 from tactbench.core.provenance.source import source_digest
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_acme
@@ -50,7 +50,8 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
         assert private not in text
     assert getpass.getuser() not in found.values()
     assert found["distributions"]["numpy"] == metadata.version("numpy")
-    assert (found["seed"], found["host"]) == (1, host_id())
+    assert (found["seed"], found["host"], len(host_id())) == (1, host_id(), 12)
+    assert usable_cores() == len(os.sched_getaffinity(0))
     assert found["memory_mb"] == psutil.virtual_memory().total >> 20
     assert found["threads"] == os.environ["OMP_NUM_THREADS"]
 

@@ -1,10 +1,12 @@
 """Real packages, edited: every byte of those that take part counts, and nothing else does."""
 
 import importlib
+from importlib.metadata import version
 
 import pytest
+from sklearn.linear_model import Ridge
 
-from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest, sources_of, versions
+from tactbench.core.provenance.source import ANSWERING, RECORDING, identity_of, source_digest, sources_of, versions
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_package
 
@@ -98,3 +100,14 @@ def test_each_place_of_tactbench_that_takes_part_is_there_and_a_missing_distribu
     assert {place for place in (*ANSWERING, *RECORDING)
             if not any((ROOT / "tactbench" / one).exists() for one in (place, f"{place}.py"))} == set()  # fmt: skip
     assert versions(("no-such-distribution",))["no-such-distribution"] == "missing"
+
+
+def test_an_object_is_its_attributes_and_the_code_that_it_uses(tmp_path, monkeypatch):
+    weak, strong = (identity_of(Ridge(alpha=alpha)) for alpha in (1.0, 2.0))
+    assert weak["object"] != strong["object"]
+    assert (weak["source"], weak["versions"]["scikit-learn"]) == ({}, version("scikit-learn"))
+    monkeypatch.syspath_prepend(tmp_path)
+    write_package(tmp_path, "identified_plugin", {"__init__.py": "class Own:\n    pass\n"})
+    assert set(identity_of(importlib.import_module("identified_plugin").Own())["source"]) == {"identified_plugin"}
+    with pytest.raises(ValueError, match="lambda"):
+        identity_of(lambda: None)
