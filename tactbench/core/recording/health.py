@@ -285,18 +285,20 @@ def _lags(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
         return
     if any(len(t_ns) < FEWEST_ROWS or (t_ns[1:] < t_ns[:-1]).any() for t_ns in (own, other)):
         return
-    names = reference.names(forces)
-    for spans in windows(own, other):
-        lags = []
-        for place, span in spans.items():
-            lag = find_lag(*sensor.between("taxel", *span), *reference.between("force", *span))
-            if lag is not None:
-                side = "behind" if lag[0] > 0 else "ahead of"
-                about = f"{1e3 * abs(lag[0]):.0f} ± {max(2e3 * lag[1], 1):.0f} ms"
-                lags.append(f"{about} {side} {listed(names)}{place}")
-        if lags:
-            yield Finding("lag", "warning", f"{sensor.name} is {', '.join(lags)}", sensor.name, names)
-            return
+    lags: list[tuple[str, tuple[float, float]]] = []
+    for place, window in windows(own, other).items():
+        lag = find_lag(*sensor.between("taxel", *window), *reference.between("force", *window))
+        if lag is not None:
+            ends = {" at the beginning": lag.beginning, " at the end": lag.end}
+            lags += (ends if lag.drifts and not place else {place: lag.middle}).items()
+    if lags:
+        names = reference.names(forces)
+        text = ", ".join(
+            f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
+            f"{listed(names)}{place}"
+            for place, (late, error) in lags
+        )
+        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, names)
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:

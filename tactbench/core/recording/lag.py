@@ -8,6 +8,8 @@ shifted force beside it. A lag is what the second explanation needs as well as t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tactbench.core.samples import FloatArray, IntArray
@@ -26,6 +28,8 @@ NEEDED = 4.0
 """Factor by which a lag must reduce what the past leaves as well, as its autocovariance at one row, in which white
 noise does not count. Of 5,376 simulated sensors without a lag, most of which creep, relax or have hysteresis, two came
 above it, both under a sine without rests; a lag of 100 ms makes it 5 to 1,000."""
+FASTEST_DRIFT = 0.05
+"""Largest rate at which two clocks drift apart [1]."""
 SIGNIFICANT = 4.0
 """Standard errors above which a lag is significant."""
 LONGEST_S, MOST_ROWS = 60.0, 2000
@@ -35,20 +39,29 @@ _BLOCKS = 8
 _ITERATIONS = 6
 
 
-def windows(sensor_ns: IntArray, force_ns: IntArray) -> list[dict[str, tuple[int, int]]]:
-    """Return the spans [ns] in which a lag is looked for, by place: the whole, and where it has none, both ends."""
+@dataclass(frozen=True)
+class Lag:
+    """Lag of a sensor [s] and its standard error at three places; negative where the sensor is early."""
+
+    beginning: tuple[float, float]
+    middle: tuple[float, float]
+    end: tuple[float, float]
+    drifts: bool
+    """Whether the lag changes by more than a sample and three standard errors."""
+
+
+def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int]]:
+    """Return the spans [ns] in which a lag is looked for, within the time that both clocks have, by their place."""
     first, last = int(max(sensor_ns[0], force_ns[0])), int(min(sensor_ns[-1], force_ns[-1]))
     slower = max(float(times[-1] - times[0]) / (len(times) - 1) for times in (sensor_ns, force_ns))
     longest = int(max(1e9 * LONGEST_S, MOST_ROWS * slower))
-    half = min(longest, last - first) // 2
-    ends = {" at the beginning": (first, first + half), " at the end": (last - half, last)}
-    return [ends] if last - first > longest else [{"": (first, last)}, ends]
+    if last - first <= longest:
+        return {"": (first, last)}
+    return {" at the beginning": (first, first + longest // 2), " at the end": (last - longest // 2, last)}
 
 
-def find_lag(
-    sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray
-) -> tuple[float, float] | None:
-    """Return the lag of the leading component of a sensor behind that of a reference [s], and its standard error.
+def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray) -> Lag | None:
+    """Return the lag of the leading component of a sensor behind that of a reference.
 
     Parameters
     ----------
@@ -59,14 +72,15 @@ def find_lag(
 
     Returns
     -------
-    tuple of float or None
-        A lag is negative where the sensor is early. None: there is none beyond a sample and four standard errors, or
-        what was recorded cannot tell: a slow ramp, a sine without rests.
+    Lag or None
+        None: there is none beyond a sample and three standard errors, or what was recorded cannot tell: a slow ramp, a
+        sine without rests.
 
     Notes
     -----
-    Separable least squares (Golub and Pereyra 1973) in the lag, by Gauss-Newton steps from where the cross-correlation
-    is best. The error is the jackknife's over eight stretches of time, and by how far the two explanations differ.
+    Separable least squares (Golub and Pereyra 1973) in the lag and its linear change, by Gauss-Newton steps from where
+    the cross-correlation is best. The error is the jackknife's over eight stretches of time, and by how far the two
+    explanations differ.
     """
     if min(len(sensor), len(force)) < FEWEST_ROWS or not sensor.shape[1] or not force.shape[1]:
         return None
@@ -77,19 +91,40 @@ def find_lag(
     if len(edges) < FEWEST_ROWS:
         return None
     x, f = _leading(sensor_s, sensor, edges), _leading(force_s, force, edges)
-    lag, gain = _correlated(x, f, len(x) // 5)
-    reach = int(0.35 * abs(lag)) + 3
-    if gain <= SUSPECTED or abs(lag) + reach > len(x) / 3:
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    curve = past = np.empty((0, 0))
+    for lag, drift in _starts(x, f):
+        reach = int(0.35 * abs(lag) + abs(drift)) + 3
+        if abs(lag) + reach > len(x) / 3:
+            continue
+        if not len(past):
+            curve = _curve(f)
+            past = np.hstack([curve, _past(f, step)])
+        shifts = min(0, int(lag) - reach), max(0, int(lag) + reach)
+        full, plain = _Explained(x, past, *shifts), _Explained(x, curve, *shifts)
+        other, plain_left, _ = plain.nearest(lag, drift)
+        found, left, error = full.nearest(*other)
+        unshifted = full.residual(0.0, 0.0)
+        noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
+        needed = _neighbours(unshifted) > NEEDED * (max(_neighbours(left), 0.0) + noise)
+        suspected = _squares(plain.residual(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
+        if needed and suspected and 2 * abs(found[1]) < FASTEST_DRIFT * len(x):
+            share = _squares(left) / len(left)
+            if best is None or share < best[0]:
+                best = share, found, error + np.outer(found - other, found - other) / 2 + np.diag([1 / 48, 0])
+    if best is None:
         return None
-    curve, shifts = _curve(f), (min(0, lag - reach), max(0, lag + reach))
-    full, plain = _Explained(x, np.hstack([curve, _past(f, step)]), *shifts), _Explained(x, curve, *shifts)
-    other, plain_left, _ = plain.nearest(lag)
-    found, left, variance = full.nearest(other)
-    noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
-    needed = _neighbours(full.residual(0.0)) > NEEDED * (max(_neighbours(left), 0.0) + noise)
-    suspected = _squares(plain.residual(0.0)) > SUSPECTED * _squares(plain_left)
-    seconds, error = step * found, step * float(np.sqrt(variance + (found - other) ** 2 / 2 + 1 / 48))
-    return (seconds, error) if needed and suspected and abs(seconds) > max(slower, SIGNIFICANT * error) else None
+    _, found, error = best
+
+    def at(*weights: float) -> tuple[float, float]:
+        return step * float(found @ weights), step * float(np.sqrt(weights @ error @ weights))
+
+    def significant(lag: float, error: float) -> bool:
+        return abs(lag) > max(slower, SIGNIFICANT * error)
+
+    late = Lag(at(1, -1), at(1, 0), at(1, 1), drifts=significant(*at(0, 2)))
+    places = (late.beginning, late.end) if late.drifts else (late.middle,)
+    return late if any(significant(*place) for place in places) else None
 
 
 class _Explained:
@@ -97,30 +132,35 @@ class _Explained:
 
     def __init__(self, x: FloatArray, columns: FloatArray, lowest: int, highest: int) -> None:
         self._rows = np.arange(-lowest, len(x) - highest)
+        self._all = np.arange(len(x))
+        self._place = 2 * self._rows / len(x) - 1
         self._x, self._slope = x, np.gradient(x)
         self._base = np.linalg.qr(columns[self._rows])[0]
 
-    def residual(self, lag: float, *, slope: bool = False) -> FloatArray:
-        """Return the residual of `x`, or of its slope, taken `lag` rows later."""
-        values = np.interp(self._rows + lag, np.arange(len(self._x)), self._slope if slope else self._x)
-        return np.asarray(values - self._base @ (self._base.T @ values))
+    def _unexplained(self, values: FloatArray) -> FloatArray:
+        return values - self._base @ (self._base.T @ values)
 
-    def nearest(self, lag: float) -> tuple[float, FloatArray, float]:
-        """Return the best lag near the given one, the residual, and the variance of the lag."""
-        at, before, best, left = float(lag), 0.0, np.inf, self.residual(lag)
-        slope = left
+    def residual(self, lag: float, drift: float) -> FloatArray:
+        """Return the residual of `x`, taken `lag` rows later in the middle and `drift` rows more at the end."""
+        return self._unexplained(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
+
+    def nearest(self, lag: float, drift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the best lag and drift near the given ones, (2,), the residual, and their covariance, (2, 2)."""
+        at, before, left = np.array([lag, drift]), np.zeros(2), self.residual(lag, drift)
+        slopes = np.empty((len(left), 2))
+        best = np.inf
         for _ in range(_ITERATIONS):
-            new = self.residual(at)
+            new = self.residual(*at)
             if _squares(new) >= best:
                 at = (at + before) / 2
                 continue
-            best, before, left, slope = _squares(new), at, new, self.residual(at, slope=True)
-            at -= float(slope @ left) / max(_squares(slope), 1e-300)
+            best, before, left = _squares(new), at, new
+            slope = np.interp(self._rows + at[0] + at[1] * self._place, self._all, self._slope)
+            slopes = np.column_stack([self._unexplained(slope), self._unexplained(slope * self._place)])
+            at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
         block = np.arange(len(left)) * _BLOCKS // len(left)
-        moved = [
-            slope[block != b] @ left[block != b] / max(_squares(slope[block != b]), 1e-300) for b in range(_BLOCKS)
-        ]
-        return before, left, (_BLOCKS - 1) * float(np.var(moved))
+        moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])
+        return before, left, (_BLOCKS - 1) * np.cov(moved.T, bias=True)
 
 
 def _squares(left: FloatArray) -> float:
@@ -143,6 +183,20 @@ def _standard(values: FloatArray) -> FloatArray:
     values = values - values.mean()
     spread = float(values.std())
     return values / spread if spread > 0 else values
+
+
+def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
+    """Return the lags and drifts [rows] that the search starts from, of the whole and of both halves."""
+    lag, gain = _correlated(x, f, len(x) // 5)
+    starts = [(float(lag), 0.0)] if gain > SUSPECTED else []
+    if starts or len(x) > 10 * FEWEST_ROWS:
+        half = len(x) // 2
+        parts = [_correlated(_standard(x[rows]), _standard(f[rows]), half // 8)
+                 for rows in (slice(half), slice(half, None))]  # fmt: skip
+        if any(gain > SUSPECTED for _, gain in parts):
+            first, second = (lag for lag, _ in parts)
+            starts.append(((first + second) / 2, float(second - first)))
+    return starts
 
 
 def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:

@@ -184,7 +184,11 @@ def open_recording(path: Path) -> Recording:
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
-        file = h5py.File(path, "r", locking=False)  # some network disks know no locks; a recording never changes
+        try:
+            # Best effort: some network disks know no locks, and a finished recording never changes.
+            file = h5py.File(path, "r", locking="best-effort")
+        except BlockingIOError:  # another program holds it open for writing
+            file = h5py.File(path, "r", locking=False)
     except (OSError, RuntimeError, ValueError) as error:
         raise FormatError(
             f"{path} cannot be read, is not an HDF5 file, or was cut short: {error}.",
