@@ -58,7 +58,7 @@ class ReplicateUnits:
         return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
 
     def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
-        """Return the (units,) index of each unit's stratum; the jackknife exchanges units of one stratum only.
+        """Return the (units,) index of each unit's stratum; the jackknife is computed within strata.
 
         If each unit has rows of one class only, the units of each class are a stratum, as a score without a class
         answers another question; otherwise all units are one stratum.

@@ -92,7 +92,7 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
         friction = np.nan
     if not 0 < friction < np.inf:
         raise DataError(
-            f"Label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}, not above 0.",
+            f"Label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
             hint="State the coefficient of friction, a number above 0.",
         )
     labels = {}
