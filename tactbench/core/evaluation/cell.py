@@ -1,4 +1,4 @@
-"""Evaluate one cell: compute a score, its interval and its cost from recordings and an estimator.
+"""Evaluate one cell (an estimator on one task and sensor): compute score, interval and cost from recordings.
 
 :func:`load_task` makes the folds; :func:`evaluate_cell` fits and scores, also any object with ``fit`` and ``predict``.
 """
@@ -87,7 +87,7 @@ class CellContext:
 
 
 class Result(Evaluated):
-    """The row of an evaluated cell, and its answers."""
+    """Result row of an evaluated cell (score, interval, cost …), with the answers behind the score."""
 
     split: str
     score: float

@@ -19,7 +19,7 @@ _WORDS = {
 
 
 def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
-    """Return the names of the sensor's streams with features for `task`; the clock of the first times the table."""
+    """Return names of the sensor's streams with features for `task`; a table's rows are the first stream's samples."""
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     kinds = {

@@ -98,7 +98,7 @@ class EventRules:
             raise DataError(
                 "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
                 "alarms on.",
-                hint="Add validation recordings of slip and disturbances (label `event: disturbance`), or re-split.",
+                hint="Add validation recordings with slip and with `event: disturbance`, or choose another split.",
             ) from error
 
     def alarms(self, one: Scored, number: int = 0) -> IntArray:

@@ -43,8 +43,8 @@ def builder(
     """
     if task.kind not in estimator.kinds:
         raise UsageError(
-            f"The estimator {estimator.name!r} does {' and '.join(estimator.kinds)}; task {task.name!r} is "
-            f"{task.kind}.",
+            f"The estimator {estimator.name!r} is for {' and '.join(estimator.kinds)}, but task {task.name!r} is of "
+            f"kind {task.kind}.",
             hint="Choose another estimator; `tactbench list estimators` shows the kinds of tasks of each.",
         )
     for name in params:
@@ -150,7 +150,7 @@ def answers(
     elif not np.isfinite(given).all():
         wrong = f"{np.count_nonzero(~np.isfinite(given))} values that are NaN or infinite"
     elif n_classes and not np.isin(given, np.arange(n_classes)).all():
-        wrong = "numbers that are no class indices (is it a regressor?)"
+        wrong = "numbers that are not class indices (is the estimator a regressor?)"
     if wrong:
         expected = f"class indices below {n_classes}" if n_classes else "finite numbers"
         raise PluginContractError(

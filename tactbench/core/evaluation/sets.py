@@ -170,7 +170,7 @@ def taken(of: Part, rows: Mask | IntArray) -> Part:
 
 
 def scale_of(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> FeatureScale:
-    """Return the scale for a set: that of the training set, or that of the set itself if the protocol says so."""
+    """Return the scale for a set: that of the training set, or the set's own if the protocol scales by each set."""
     return FeatureScale(*moments((other if protocol.scaled_by == "each set" else train).X))
 
 
@@ -185,7 +185,7 @@ def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, st
         raise NotApplicable(
             f"window={window} needs consecutive single samples, which "
             f"{f'task {task.name!r}' if own else f'protocol {rules.name!r}'} does not use.",
-            hint="Use protocol `deployable` and a task of samples, or leave `window` out.",
+            hint="Use protocol `deployable` and a task on single samples, or leave `window` out.",
         )
 
     def of(table: Table) -> Table:

@@ -79,7 +79,7 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     clock = recording.read(found["slip"][0][0])
     require_forward(clock, name)
     if clock.t_ns is None:
-        raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="Map a time column.")
+        raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="State a clock in the mapping.")
     columns = np.array([channel_on(recording, one, clock) for one in _CHANNELS])
     whole = ~np.isnan(columns).any(axis=0)
     if not whole.all():

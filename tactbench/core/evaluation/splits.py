@@ -129,7 +129,7 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
             names |= {name for name in task.splits if shots(name)}
             able = sorted(name for name in names if _can(name, data))
             raise UsageError(
-                f"These recordings cannot be split by {requested!r}.", hint=f"Choose a split of: {', '.join(able)}."
+                f"These recordings cannot be split by {requested!r}.", hint=f"Choose one of: {', '.join(able)}."
             )
         return requested
     for name in sorted(task.splits, key=lambda name: name == "shuffled"):  # a leak is better than no answer only
@@ -203,7 +203,7 @@ def training_sessions(data: Dataset) -> list[str]:
 
 
 def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_one: bool = False) -> list[Assignment]:
-    """Return the folds of `split`.
+    """Return the folds, masks of training, test and validation rows, of the split called `split`.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
             more = own(streams)
             if not more or not all(np.isfinite(value) for value in more.values()):
                 raise PluginContractError(
-                    f"{task.features_by} gave no features, or infinite ones, for recording {table.meta.name!r}.",
+                    f"{task.features_by} gave no or not only finite numbers for recording {table.meta.name!r}.",
                     hint="Given a tuple of StreamReadings, it must return a mapping of names to finite numbers.",
                 )
             found |= {name: float(value) for name, value in more.items()}
@@ -301,7 +301,7 @@ def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
                 hint="State the clock or the rate in the mapping.",
             )
         if not len(stream.data):
-            raise DataError(f"Recording {table.meta.name!r} has no sample of {stream.stream}.", hint="Leave it out.")
+            raise DataError(f"Recording {table.meta.name!r} has no {stream.stream} sample.", hint="Omit the recording.")
     return streams
 
 
@@ -318,7 +318,7 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
     ends_ns = np.arange(first, nanoseconds(end_s) + 1, nanoseconds(target.hop_s), dtype=np.int64)
     if not ends_ns.size:
         raise DataError(
-            f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
+            f"Recording {table.meta.name!r} is shorter than a frame, {target.window_s:g} s.", hint="Omit the recording."
         )
     return ends_ns
 
@@ -374,6 +374,6 @@ def _own_features(
     if found.ndim != 2 or len(found) != len(ends_s) or np.isinf(found).any():
         raise PluginContractError(
             f"{estimator.frames_by} gave an array of shape {found.shape} for {len(ends_s)} frames.",
-            hint="It must return a (frames, features) array of finite numbers, or NaN where there is no answer.",
+            hint="The function must return a (frames, features) array of finite numbers, or NaN for no answer.",
         )
     return tuple(f"{stream.channels[0]} {estimator.name} {place + 1}" for place in range(found.shape[1])), found

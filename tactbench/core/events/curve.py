@@ -80,7 +80,7 @@ class ThresholdCurve:
         if np.any(np.isnan(rate)) or self.scores.latency_s.shape[-1] == 0:
             raise DataError(
                 "No operating point can be chosen: there is no event, or no time in which to count false alarms.",
-                hint="Add recordings with events and with such time, or change `false_alarm_time` of the policy.",
+                hint="Add recordings with events and of disturbances, or change `false_alarm_time` of the policy.",
             )
         order = np.lexsort((self.threshold, self.scores.f1, self.scores.recall))[::-1]
         return np.asarray(order[rate[order] <= max_false_alarms_per_minute])

@@ -1,4 +1,4 @@
-"""Ranks of cells as shown in tables; `ranking` computes them, and only there numpy is imported."""
+"""Ranks of cells as shown in tables; module `ranking`, which imports numpy, computes them."""
 
 from __future__ import annotations
 
