@@ -28,7 +28,7 @@ from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec
 
 OTHER_SCALES = {0.5: "halved", 2.0: "doubled"}
-"""Factors by which the thresholds of the slip labels are also scaled, and the word for each factor."""
+"""Further factors on the thresholds of the slip labels, and the word for each factor in reports."""
 BOUNDS_PER_MINUTE = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Upper bounds of false alarms per minute on validation recordings; for each bound, a threshold is chosen."""
 
@@ -44,7 +44,7 @@ class Scored(NamedTuple):
     """(n,) score of each frame; NaN for a frame without an answer."""
     reference: SlipReference
     thresholds: tuple[float, ...] = ()
-    """The fold's threshold, then one for each of `BOUNDS_PER_MINUTE` unless the detector has its own; () before."""
+    """The fold's threshold, then one for each of `BOUNDS_PER_MINUTE` unless the detector has its own; else ()."""
 
     def truth(self, scale: float = 1.0) -> GroundTruth:
         """Return the events from the first frame on, labelled by slip thresholds multiplied by `scale`."""

@@ -73,7 +73,7 @@ class TaskData:
 
     @property
     def groups(self) -> npt.NDArray[Any]:
-        """Return the (n,) group labels by which the split keeps rows together; the session's name without groups."""
+        """Return the (n,) group labels by which the split keeps rows together; session names if it has none."""
         return self.per_row("groups", self.assignments[0].groups)
 
     @property

@@ -30,7 +30,7 @@ class Interval:
     low: float | None = None
     """Lower end; None if there are too few units for an interval."""
     high: float | None = None
-    """Upper end; None, beside a number as `low`, if the data do not bound an error from above."""
+    """Upper end; None if there is no interval, or if the data do not bound an error from above."""
     method: str = ""
 
 
@@ -121,7 +121,7 @@ def score_interval(
 
 
 def _few(each: FloatArray) -> bool:
-    """Return True if (units,) counts cannot show how units differ: sum at most 2, or below a third of them not 0."""
+    """Return True if (units,) counts are too few to show how units differ: sum at most 2, or over two thirds are 0."""
     return bool(each.sum() <= 2 or np.count_nonzero(each) < len(each) / 3)
 
 

@@ -15,7 +15,7 @@ from tactbench.core.recording.health import MONOTONE, is_copy
 from tactbench.core.spec.row import LEAKS
 
 BLOCK = 16
-"""Number of consecutive rows in a block; a training and a test block that are equal are a leak."""
+"""Number of consecutive rows that must be equal for a leak; a recording with fewer rows is one block."""
 CHANGES = 0.5
 """Smallest share of rows in a block that differ from the row before; sensors at rest repeat the same row."""
 MOST_SHARED = 0.05

@@ -52,9 +52,9 @@ KARL2016 = ProtocolSpec(
     roles_only=True,
     uses_test_statistics=True,
 )
-"""The protocol of that paper: "the first 600 samples were discarded"; "if any of the force or taxel responses violated
-a three sigma rule, the sample was discarded"; "each of the training, validation and testing set was divided by its
-taxel wise standard deviation after subtracting its taxel wise mean" (Karl et al. 2016, section III).
+"""Protocol of Karl et al. 2016, section III: "the first 600 samples were discarded"; "if any of the force or taxel
+responses violated a three sigma rule, the sample was discarded"; "each of the training, validation and testing set was
+divided by its taxel wise standard deviation after subtracting its taxel wise mean".
 """
 
 KARL2016_TRAINING_SCALE = KARL2016.model_copy(
@@ -75,7 +75,7 @@ DEPLOYABLE = ProtocolSpec(
     scaled_by="training set",
     window_over="consecutive samples",
 )
-"""As for a sensor in use: tare before each press, causal filters, no statistics of the test set or its labels."""
+"""As in use: tare before each press, causal filters, no statistics of the test set, no row dropped by its label."""
 
 DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
     update={

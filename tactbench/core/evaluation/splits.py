@@ -23,7 +23,7 @@ Places = npt.NDArray[np.int64]
 FOLDS = 5
 """Number of folds of grouped and shuffled splits."""
 TRAIN_SHARE = 0.8
-"""Share of a recording's rows, from its start, on which an in-session split trains."""
+"""Share of a recording's labelled rows, from its start, on which an in-session split trains."""
 SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 """Splits whose unit of replication is the session, as it also is for few-shot-N."""
 ONE_BY_ONE = ("unit", "placement", "cap_radius_mm")
@@ -277,7 +277,7 @@ def _cut_in_time(data: Dataset, rows: Mask, gap: int, fewest: int) -> tuple[Mask
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
-    """Add to the name of a fold with a single test value if training has values on both sides of it (interpolated)."""
+    """Add "interpolated" or "extrapolated" to the name of a fold with one test value, by the range of training."""
     y = data.column(lambda table: table.y)
     if data.classes or y.ndim > 1:
         return fold

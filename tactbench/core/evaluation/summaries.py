@@ -109,7 +109,7 @@ def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
 
 
 def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the streams of a recording without dropped samples, tared if the protocol tares; time 0 is the cut."""
+    """Return the streams of a recording after the dropped start, tared if the protocol tares; times count from there."""
     begin_s, found = dropped_s(table.meta, rules), []
     for stream in tared_readings(table, rules):
         data, time_s = stream.data, stream.time_s
@@ -126,7 +126,7 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
 
 
 def tared_readings(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the streams of a recording; if the protocol tares, minus their means over the hold (if with a clock)."""
+    """Return the streams of a recording; those with a clock minus their means over the hold, if the protocol tares."""
     return tuple(
         one if one.time_s is None or not rules.tare
         else replace(one, data=less_rest(one.data, one.time_s < hold_s(table.meta)))
@@ -194,7 +194,7 @@ def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
 
 
 def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recording: str) -> FloatArray:
-    """Return a stream's (n, channels) samples after a causal band-pass (none if `band_hz` is None), from 0 at first."""
+    """Return a stream's (n, channels) samples through a causal band-pass, whose output starts at 0; None: no filter."""
     if band_hz is None:
         return stream.data
     if stream.rate_hz is None:
