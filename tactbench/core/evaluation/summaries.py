@@ -109,7 +109,7 @@ def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
 
 
 def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the streams of a recording after the dropped start, tared if the protocol tares; times count from there."""
+    """Return the streams of a recording after the dropped start, tared if the protocol tares; times start there."""
     begin_s, found = dropped_s(table.meta, rules), []
     for stream in tared_readings(table, rules):
         data, time_s = stream.data, stream.time_s
