@@ -1,1 +1,1 @@
-"""From recordings to a score: dataset, protocol, split, estimator, metric, interval, one cell."""
+"""Evaluation of estimators, from recordings to a score: data sets, protocols, splits, metrics and intervals."""

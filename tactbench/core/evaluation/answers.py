@@ -1,6 +1,6 @@
-"""From folds to answers: models fitted to the training rows of each fold, and their answers to its test rows.
+"""Fit a model to the training rows of each fold, and compute its answers to the fold's test rows.
 
-Regression, classification and events differ here in what of a fold is scored (:func:`answered_fold`).
+Regression and classification score each row (or recording), tasks of events each event (:func:`answered_fold`).
 """
 
 from __future__ import annotations
@@ -30,56 +30,56 @@ from tactbench.core.spec.scene import Role
 
 @dataclass(frozen=True)
 class Configured:
-    """An estimator: its descriptor, how it is made, and parameters of the user."""
+    """An estimator: its descriptor, the function that makes it, and the parameters that the user has set."""
 
     descriptor: EstimatorDescriptor
     build: Build
     params: Mapping[str, Any] = field(default_factory=dict)
-    """fixed by the user: they are not searched"""
+    """Parameters set by the user, which are not searched."""
     fit_params: Mapping[str, Callable[[Part], Any]] = field(default_factory=dict)
-    """other parameters of its ``fit``, as functions of a training set"""
+    """Further arguments of the estimator's ``fit``: by name, the function from a training set to the argument."""
 
 
 @dataclass(frozen=True)
 class FittedFold:
-    """A model, and the fold that it was fitted to."""
+    """A model and the fold to whose training set it was fitted, with the time [s] of search and fit."""
 
     fold: Fold
     model: Estimator
     choice: Choice | None
-    """parameters that were chosen on validation data; None: there was nothing to choose"""
+    """Parameters chosen on validation data; None if there was nothing to choose."""
     k: int
-    """rows that the mean filter looks back"""
+    """Number of earlier rows that the mean filter includes beside the current one."""
     search_s: float
     fit_s: float
 
 
 @dataclass(frozen=True)
 class AnsweredFold:
-    """The answers of one fold, and their cost."""
+    """Answers of a model to the sets of one fold, the scores of these answers, and the computing time [s]."""
 
     name: str
     choice: Choice | None
     score: float
     validation: float | None
-    """the score on validation data"""
+    """Score on validation data; None without such data."""
     sizes: tuple[int, int]
-    """training and test rows, or recordings; of events their number and that of the recordings tested"""
+    """Numbers of training rows and of test answers: rows, recordings, or events plus one for each test recording."""
     untrained: tuple[Any, ...]
-    """classes that are tested and that no training row had"""
+    """Classes of test rows that no training row has."""
     search_s: float
     fit_s: float
     predict_s: float
     batch_rows: int
     sets: Mapping[Role, Answers]
     detected: Sequence[Scored] = ()
-    """test recordings of a task of events, all with the fold's thresholds"""
+    """Scored test recordings of an event detection task, each with the fold's thresholds; else empty."""
 
 
 def fitted_fold(
     estimator: Configured, data: TaskData, assignment: Assignment, metric: Metric, counts: Counter[str], clock: Clock
 ) -> FittedFold:
-    """Choose on validation data, and fit."""
+    """Choose parameters and mean filter on validation data, then fit the estimator to the training set of a fold."""
     descriptor, made = estimator.descriptor, data.data
     began = clock()
     choice = select(descriptor, estimator.params, estimator.build, made, data.rules, assignment, metric, counts)
@@ -93,14 +93,14 @@ def fitted_fold(
     if len(values) < 2:
         only = made.classes[int(values[0])] if made.classes else values[0]
         raise DataError(
-            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
+            f"All training labels of fold {fold.name!r} are {only}; two different labels are needed to fit a model.",
             hint="Choose another split, or check the label column with `tactbench inspect`.",
         )
     if made.vote:
         lost = np.setdiff1d(made.recording[assignment.test & made.labelled], fold.test.recording)
         if lost.size:
             raise DataError(
-                f"The protocol leaves no row of recording {made.metas[lost[0]].name!r}, which has one answer.",
+                f"The protocol drops all rows of recording {made.metas[lost[0]].name!r}: it would have no answer.",
                 hint="Use protocol `deployable-untared`, or leave the recording out.",
             )
     X = features_of(fold.train, descriptor)
@@ -120,7 +120,7 @@ def answered_fold(
     number: int,
     clock: Clock,
 ) -> AnsweredFold:
-    """Have a model answer its fold; validation and training answers are kept where the fold is the only one."""
+    """Compute and score a model's answers to its fold; keep those to validation and training rows of a single fold."""
     fold, made = fitted.fold, data.data
     n_classes = 0 if rules else len(made.classes)
     began = clock()
@@ -164,7 +164,7 @@ def answered_fold(
 
 
 def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
-    """Return the answers to rows, combined where a recording has one answer, with the reference force."""
+    """Return the answers to rows, combined into one per recording where the task asks for that, and the force."""
     if made.vote:
         part, predicted = voted(part, predicted, len(made.classes))
     force = at_rows(made, made.column(lambda table: np.nan if table.force is None else table.force), part)

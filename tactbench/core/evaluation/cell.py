@@ -1,6 +1,6 @@
-"""One cell: its score and what belongs to it, from recordings and an estimator.
+"""Evaluate one cell (an estimator on one task and sensor): compute score, interval and cost from recordings.
 
-:func:`load_task` makes the folds, :func:`evaluate_cell` does the rest, for any object with ``fit`` and ``predict`` too.
+:func:`load_task` makes the folds; :func:`evaluate_cell` fits and scores, also any object with ``fit`` and ``predict``.
 """
 
 from __future__ import annotations
@@ -58,41 +58,41 @@ from tactbench.core.thread_limit import thread_limit
 
 @dataclass(frozen=True)
 class CellContext:
-    """The question of one cell, without its recordings."""
+    """Task, estimator, protocol, split and options by which one cell is evaluated, without its recordings."""
 
     task: TaskSpec
     estimator: EstimatorDescriptor
     params: Mapping[str, Any]
-    """values other than the estimator's defaults; they are not searched"""
+    """Parameters set in place of the estimator's defaults; they are not searched."""
     protocol: str
-    """how recordings become X and y"""
+    """Name of the protocol, by which recordings become features X and labels y."""
     split: str | OwnSplit | None
-    """name of the split; None: the task's first that the recordings can serve"""
+    """Name of the split; None for the first of the task's splits for which the recordings suffice."""
     seed: int
-    """seed of everything random: the same seed gives the same score in any process"""
+    """Seed of all random numbers; the same seed gives the same score in any process."""
     clock: Clock
     threads: int = 1
-    """threads of the estimator and of BLAS"""
+    """Number of threads of the estimator and of BLAS."""
     latency: bool = True
-    """whether to measure how long the answer to one row takes"""
+    """True to measure the time of ``predict`` on one row."""
     given: Estimator | None = None
-    """an object that answers in place of `estimator`"""
+    """Object with ``fit`` and ``predict`` to evaluate in place of `estimator`."""
     metric: Metric | None = None
-    """None: the task's"""
+    """Metric of the score; None for the task's own metric."""
     fit_params: Mapping[str, Any] = field(default_factory=dict)
-    """of `given`; see :func:`routed`"""
+    """Further arguments of the ``fit`` of `given`; see :func:`routed`."""
     window: int = 0
     step: int = 1
-    """as of :func:`load_task`"""
+    """Rows of a window and rows between the ends of two windows, as in :func:`load_task`."""
 
 
 class Result(Evaluated):
-    """The row of an evaluated cell, and its answers."""
+    """Result row of an evaluated cell (score, interval, cost …), with the answers behind the score."""
 
     split: str
     score: float
     sets: dict[Role, Any] = Field(exclude=True)
-    """:class:`Answers` by role: test always; validation, and for regression train, where the split has one fold"""
+    """:class:`Answers` by role: always test; of a split of one fold also validation and, for regression, train."""
 
 
 def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
@@ -101,9 +101,9 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     Raises
     ------
     NotApplicable
-        If the question cannot be asked of these recordings.
+        If the task, protocol or split does not suit these recordings.
     UsageError
-        If a parameter is unknown or the split cannot be served.
+        If a parameter is unknown or the recordings cannot be split as requested.
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
@@ -271,19 +271,19 @@ def _joined(folds: Sequence[Answers]) -> Answers:
 
 
 def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
-    """Raise for a score that is no number: because of the answers, or of the labels."""
+    """Raise for a score that is not a finite number: PluginContractError if answers are too large, else DataError."""
     largest = float(np.abs(tested.y_pred).max())
     if largest > LARGEST:
         raise PluginContractError(
-            f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: their {metric.name} overflows.",
+            f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: the {metric.name} overflows.",
             hint=f"Its predict(X) must return numbers below {LARGEST:g}, in the unit of the labels.",
         )
-    why = "no finite number" if metric.function else "undefined: their labels never change"
+    why = "not a finite number" if metric.function else "undefined: all test labels are equal"
     raise DataError(f"The {metric.name} of {len(tested)} test rows is {why}.", hint="Choose another split or metric.")
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
-    """Return the recordings that some fold uses, counts of those that none uses, and stamps."""
+    """Return the recordings that a fold uses, counts of the recordings that no fold uses, and warnings of leaks."""
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
@@ -297,7 +297,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
 
 
 def _of_answers(data: TaskData) -> list[str]:
-    """Return remarks on how recordings, frames or events were answered."""
+    """Return remarks on answers to whole recordings and to frames, for the report."""
     if data.task.answer_per == "recording":
         return [
             f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
@@ -311,7 +311,7 @@ def _of_answers(data: TaskData) -> list[str]:
 
 
 def _incomplete(recorded: Dataset) -> list[str]:
-    """Return stamps of incomplete recordings that were left out or taken, with the reasons."""
+    """Return texts that count the incomplete recordings left out and those evaluated nevertheless, with reasons."""
     start = "recordings left out ("
     out = {name[len(start) : -1]: n for name, n in recorded.counts.items() if name.startswith(start + INCOMPLETE)}
     taken = [meta.excluded for meta in recorded.metas if meta.excluded]
@@ -321,14 +321,14 @@ def _incomplete(recorded: Dataset) -> list[str]:
 
 
 def _groups_alike(data: TaskData) -> Iterator[str]:
-    """Yield labels of the split's groups that are probably one although they differ."""
+    """Yield a text on labels of the split's groups that differ only by case or spaces: probably the same group."""
     name = data.assignments[0].groups
     tables = [table.groups[name] for table in data.data.tables if name in table.groups]
     return alike(f"values of {name}", sorted({str(one) for table in tables for one in np.unique(table)}))
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:
-    """Yield the tested classes without a training row, which no estimator can answer."""
+    """Yield a text that names the test classes without a training row, which no estimator can predict, by fold."""
     folds: dict[str, list[str]] = {}
     for one in answered:
         for label in one.untrained:
@@ -339,9 +339,9 @@ def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:
 
 
 def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[str, float]:
-    """Return the numbers chosen; fold by fold where folds differ, since their median is what no fold chose.
+    """Return the parameters chosen on validation data by name, with the fold's name too where folds differ.
 
-    A threshold that is never reached is left out.
+    An infinite threshold, which no score reaches, is left out.
     """
     each: dict[str, dict[str, float]] = {}
     for one in answered:

@@ -1,4 +1,4 @@
-"""Find a task's channels in a recording and put them on one clock: samples are looked up, never interpolated."""
+"""Find a task's channels in a recording and put them on one clock by taking nearest samples, without interpolation."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _WORDS = {
     "taxel": "taxel", "dc_pressure": "static pressure", "ac_pressure": "vibration",
     "dc_temperature": "temperature", "ac_temperature": "heat flow",
 }  # fmt: skip
-"""Readers' words for the kinds of channels."""
+"""Words for kinds of channels, for messages to the user."""
 
 
 def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
-    """Return the sensor's streams that carry features; the first one's clock is that of the table."""
+    """Return names of the sensor's streams with features for `task`; a table's rows are the first stream's samples."""
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     kinds = {
@@ -30,15 +30,15 @@ def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
     for kind in task.features:
         if not any(kind in there for there in kinds.values()):
             raise NotApplicable(
-                f"Task {task.name!r} needs a {_WORDS.get(kind, kind)} stream; {meta.sensor.name} has none in "
-                f"{meta.name!r}.",
-                hint="See what the sensor has with `tactbench show`.",
+                f"Task {task.name!r} needs a {_WORDS.get(kind, kind)} stream; {meta.sensor.name} has no such stream in "
+                f"recording {meta.name!r}.",
+                hint="List the sensor's streams with `tactbench show`.",
             )
     return [name for name, there in kinds.items() if there & set(task.looks_at)]
 
 
 def numbers(data: StreamData) -> FloatArray:
-    """Return the samples as float64, with NaN where there is none."""
+    """Return the (n, channels) samples of a stream as float64; NaN for missing or infinite samples."""
     numbers = data.data.astype(np.float64)
     if data.quality is not None:
         numbers[(data.quality & Quality.MISSING) != 0] = np.nan
@@ -47,11 +47,11 @@ def numbers(data: StreamData) -> FloatArray:
 
 
 Found = tuple[str, int, ChannelSpec]
-"""Stream, column in it, and the channel."""
+"""Name of a stream, index of a column in the stream, and the channel in that column."""
 
 
 def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray:
-    """Return a channel on the clock of a stream, in the unit of `target`; all NaN if there is none."""
+    """Return the (n,) samples of the target channel at the times of `clock`, in the target's unit; NaN if absent."""
     found = channels_for(recording, target)
     if not found:
         return np.full(len(clock.data), np.nan)
@@ -59,15 +59,15 @@ def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -
         names = ", ".join(channel.name for _, _, channel in found)
         raise DataError(
             f"The recording {recording.meta.name!r} has several {target.kind} channels: {names}.",
-            hint="Name one in the task's target.",
+            hint="Name one of these channels in the task's target.",
         )
     return read_channel(recording, clock, found[0]) * unit_factor(found[0][2], target.unit)
 
 
 def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
-    """Return the channels that could be meant; of several the one called ``normal``, else the one called ``fz``.
+    """Return the channels that match `target`; of several, only that called ``normal``, or else ``fz``, if present.
 
-    One called ``shear`` must be named by the task: it is a force, but not the one that presses.
+    A channel called ``shear`` is returned only if the task names it, since it is not the force of the press.
     """
     found = [
         (name, place, channel)
@@ -84,14 +84,14 @@ def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
 
 
 def read_channel(recording: Recording, clock: StreamData, found: Found) -> FloatArray:
-    """Return (n,) samples of a channel on the clock of a stream, as recorded; NaN where there is none."""
+    """Return the (n,) samples of a channel at the times of `clock`, in the recorded unit; NaN where there is none."""
     name, place, _ = found
     data = clock if name == clock.spec.name else recording.read(name)
     return on_clock(numbers(data)[:, [place]], data, clock, recording.meta.name)[:, 0]
 
 
 def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recording: str) -> FloatArray:
-    """Return (n, q) of (m, q) values of a stream on the clock of another; NaN where it has no sample."""
+    """Return the (m, q) `values` of `stream` at the n times of `clock`, (n, q); NaN where no sample is near."""
     if stream is clock:
         return values
     rows = nearest_rows(clock, stream, recording)
@@ -101,7 +101,7 @@ def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recordin
 
 
 def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData) -> str:
-    """Return the spans of `clock` and of a channel with samples, none of which is near; empty where that is not so."""
+    """Return a text on the time spans [s] of `clock` and of the target channel; empty if either is unknown."""
     found = channels_for(recording, target)
     if len(found) != 1:
         return ""
@@ -118,20 +118,20 @@ def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData
 
 
 def unit_factor(channel: ChannelSpec, unit: str) -> float:
-    """Return the factor from stored numbers to `unit`: by the channel's unit, else by its scale."""
+    """Return the factor from stored numbers to `unit`, from the channel's unit or else from the channel's scale."""
     try:
         return units.conversion(channel.unit, unit)
     except UsageError:
         if channel.scale is not None:
             return channel.scale.to(unit)
         raise DataError(
-            f"The channel {channel.name!r} is recorded in {channel.unit!r}, which is no {unit!r}.",
-            hint="State its unit or its scale in the mapping.",
+            f"The channel {channel.name!r} is recorded in {channel.unit!r}, which cannot be converted to {unit!r}.",
+            hint="State the channel's unit or scale in the mapping.",
         ) from None
 
 
 def require_forward(data: StreamData, recording: str) -> None:
-    """Raise DataError if time runs backwards in a stream, or stands still: nothing can be aligned or filtered then."""
+    """Raise DataError if times of a stream decrease or are all equal, so that rows cannot be aligned or filtered."""
     if data.t_ns is None or len(data.t_ns) < 2:
         return
     steps = np.diff(data.t_ns)
@@ -140,24 +140,24 @@ def require_forward(data: StreamData, recording: str) -> None:
         what = f"runs backwards {backward} times" if backward else "stands still"
         raise DataError(
             f"In recording {recording!r}, the time of {data.spec.name} {what}.",
-            hint="See where with `tactbench inspect`. Rows of a counter that begins at 0 again are imported with "
-            "`wraps_at` under `time`; sort others before they are imported.",
+            hint="Find the rows with `tactbench inspect`. If the time is a counter that returns to 0, set `wraps_at` "
+            "under `time` and import again; otherwise sort the rows by time before the import.",
         )
 
 
 def nearest_rows(features: StreamData, other: StreamData, recording: str) -> IntArray:
-    """Return (n,) which row of `other` belongs to each row of `features`.
+    """Return (n,) indices of the row of `other` nearest in time to each row of `features`.
 
-    It is the nearest in time; -1 where that is further away than half a median step of the slower clock. Without a
-    clock, rows belong together if they are equally many.
+    The index is -1 where the nearest row is further away than half the median step of the slower clock. Without a
+    clock, row i belongs to row i, and both streams must have equally many rows.
     """
     n, m = len(features.data), len(other.data)
     if features.t_ns is None or other.t_ns is None:
         if n != m:
             raise DataError(
                 f"In recording {recording!r}, {features.spec.name} has {n} rows and {other.spec.name} {m}, and there "
-                "is no clock to align them by.",
-                hint="Give the mapping a time column, or tables of equal length.",
+                "is no clock to align the rows by.",
+                hint="State a time column in the mapping, or import tables of equal length.",
             )
         return np.arange(n, dtype=np.int64)
     if n == m and np.array_equal(features.t_ns, other.t_ns):

@@ -1,4 +1,4 @@
-"""Recordings as tables: features, targets and groups of each on one clock."""
+"""Read recordings into tables: for each recording, features, targets and group labels on one clock."""
 
 from __future__ import annotations
 
@@ -34,88 +34,88 @@ from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, Vecto
 
 Mask = npt.NDArray[np.bool_]
 MUCH = 0.05
-"""Share of the rows left out from which on it stands beside the score."""
+"""Smallest share of rows left out that is reported beside the score."""
 MOST_NAMED = 4
-"""Recordings left out that are named."""
+"""Largest number of left-out recordings that a finding names."""
 _SPACES = re.compile(r"(?<!\d)\s+|\s+(?!\d)")
-"""Spaces, but for those between digits: '1 12' and '11 2' are two."""
+"""Spaces, except those between digits, so that the labels '1 12' and '11 2' remain different."""
 LARGEST = 1e100
-"""Of a reading or a target, in whatever unit: sums of the squares of a billion of them are still numbers."""
+"""Largest size of a reading or target, in any unit: the squares of a billion such numbers still sum to a finite one."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """One recording on the clock of its features. Rows with a missing feature are not in it."""
+    """One recording as rows on the clock of its features, without the rows in which a feature is missing."""
 
     meta: RecordingMeta
     X: FloatArray
-    """(n, features) readings as recorded"""
+    """(n, features) readings, in the recorded units"""
     y: npt.NDArray[Any]
-    """(n,) numbers in the task's unit, (n, components) where it asks for a vector, or class indices; meaningless where
+    """(n,) numbers in the task's unit, (n, components) of a vector target, or (n,) class indices; meaningless where
     `labelled` is False"""
     labelled: npt.NDArray[np.bool_]
-    """(n,) False where the recording has no label for the row"""
+    """(n,) True where the recording has a label for the row"""
     force: FloatArray | None
-    """(n,) reference force, if there is one; NaN where it has no sample"""
+    """(n,) reference force, NaN where it has no sample; None without a reference force"""
     time_s: FloatArray
-    """(n,) seconds since the first sample, or the row index where the recording has no clock"""
+    """(n,) seconds since the first sample, or row indices if the recording has no clock"""
     row: IntArray
-    """(n,) index of the row in its stream"""
+    """(n,) index of each row in the recorded stream"""
     rows: int
-    """of its stream, left out or not"""
+    """Number of rows in the recorded stream, with those left out here"""
     groups: Mapping[str, npt.NDArray[np.str_]]
-    """Labels by which rows can be kept together: name -> (n,)"""
+    """(n,) labels of the rows by name, by which a split can keep rows together"""
     readings: tuple[StreamReadings, ...] = ()
-    """Every stream on its own clock, times from the first row on; read for tasks of summaries or frames"""
+    """Each stream on its own clock, times in s since the table's first row; only for tasks on summaries or frames"""
     reference: SlipReference | None = None
-    """Slip by the reference, on its own clock; read for tasks of slip"""
+    """Slip measured by the reference sensor, on that sensor's clock; only for slip tasks"""
     apart: str = ""
-    """Spans of the samples of features and target, if these never meet"""
+    """Text on the time spans of features and target if no sample of one is near a sample of the other, else empty"""
 
     def taken(self, rows: slice | IntArray | Mask) -> Table:
-        """Return some of its rows."""
+        """Return a table of the selected rows only."""
         columns = {name: getattr(self, name) for name in ("X", "y", "labelled", "force", "time_s", "row")}
         kept: dict[str, Any] = {name: None if one is None else one[rows] for name, one in columns.items()}
         return replace(self, **kept, groups={name: one[rows] for name, one in self.groups.items()})
 
     @property
     def slip(self) -> SlipReference:
-        """The reference of a task of slip."""
+        """The slip measured by the reference sensor; only for slip tasks."""
         assert self.reference is not None
         return self.reference
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """All recordings of a cell."""
+    """All recordings that a cell is evaluated on, as tables with the same features."""
 
     tables: tuple[Table, ...]
     features: tuple[str, ...]
     classes: tuple[Any, ...]
     """Class labels in order of their index; empty for regression"""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """Counts of what was left out, by reason"""
+    """Counts of recordings, rows and samples that were left out or flagged, by reason"""
     findings: tuple[str, ...] = ()
-    """Findings in the recordings that bear on a score, and data that take no part"""
+    """Texts on faults in the recordings that may affect a score, and on data left out"""
     paths: tuple[Path, ...] = ()
-    """The files of the tables"""
+    """Files that the tables were read from, in the same order"""
     whole: bool = False
-    """Each recording has one answer: no split may cut it"""
+    """True if the task has one answer for each recording or frame, so that no split may cut a recording"""
     vote: bool = False
-    """That answer is combined from those of the recording's rows"""
+    """True if the answer to a recording is combined from the answers to its rows"""
 
     @property
     def labelled(self) -> Mask:
-        """(rows,) whether a row has a label, of all recordings one after the other."""
+        """(rows,) True for a row with a label; rows of all recordings, one recording after the other."""
         return self.column(lambda table: table.labelled)
 
     @property
     def recording(self) -> IntArray:
-        """(rows,) the recording of each row."""
+        """(rows,) index of the recording to which each row belongs."""
         return np.repeat(np.arange(len(self.tables)), [len(table.row) for table in self.tables])
 
     def column(self, of: Callable[[Table], Any], rows: Mask | None = None) -> npt.NDArray[Any]:
-        """Return (n, …) values of all rows, or of some: `of` gives one value for each recording, or for each row."""
+        """Return (n, …) values of all rows, or of those in a mask; `of` gives one value per recording or per row."""
         masks: Sequence[Any] = [...] * len(self.tables) if rows is None else self.parted(rows)
         found = []
         for table, mask in zip(self.tables, masks, strict=True):
@@ -124,17 +124,17 @@ class Dataset:
         return np.concatenate(found)
 
     def parted(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
-        """Return values of all rows recording by recording."""
+        """Return the (rows, …) values of all rows as a list of arrays, one array for each recording."""
         return np.split(column, np.cumsum([len(table.row) for table in self.tables])[:-1])
 
     @property
     def metas(self) -> tuple[RecordingMeta, ...]:
-        """The recordings' metadata, in order."""
+        """Metadata of each recording, in the order of the tables."""
         return tuple(table.meta for table in self.tables)
 
 
 def at_rows(data: Dataset, column: npt.NDArray[Any], rows: Part | Answers) -> npt.NDArray[Any]:
-    """Return (m, …) values at the rows of a set, of (n, …) values of all rows."""
+    """Return the (m, …) values at the m rows of a training, validation or test set, from (n, …) values of all rows."""
     found, columns = np.empty((len(rows), *column.shape[1:]), dtype=column.dtype), data.parted(column)
     for place in np.unique(rows.recording):
         mine = rows.recording == place
@@ -143,25 +143,25 @@ def at_rows(data: Dataset, column: npt.NDArray[Any], rows: Part | Answers) -> np
 
 
 def thinned(data: Dataset, every: int) -> Dataset:
-    """Return every `every`-th row of each recording from its first, as a sensor so many times slower gives them."""
+    """Return the first and then each `every`-th row of each recording, as from a sensor with a lower sampling rate."""
     return replace(data, tables=tuple(table.taken(slice(None, None, every)) for table in data.tables))
 
 
 def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomplete: bool = False) -> Dataset:
-    """Read `recordings` as `task` needs them.
+    """Read the features, targets and group labels that `task` needs from `recordings`.
 
     Parameters
     ----------
     include_incomplete
-        Whether recordings take part that miss more than their rig file allows.
+        True to read also recordings that miss more samples than their rig file allows.
 
     Raises
     ------
     NotApplicable
-        If the sensor has no channel of a kind the task needs, or no recording has the label it asks for.
+        If the sensor has no channel of a kind that the task needs, or no recording has the task's target.
     DataError
-        If a channel has no sample at all, the recordings are of several sensors or disagree about their channels, one
-        is given twice, or nothing is left.
+        If a channel has no sample at all, the recordings are of several sensors or differ in their channels, a
+        recording is given twice, or no recording is left.
     """
     counts: Counter[str] = Counter()
     seen: dict[str, dict[str, str]] = {}
@@ -180,12 +180,12 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         meta, first = table.meta, (tables or [table])[0].meta
         if tables and (meta.sensor.name, names) != (first.sensor.name, features):
             raise DataError(
-                f"The recordings {first.name!r} of {first.sensor.name} and {meta.name!r} of {meta.sensor.name} are not "
-                "of one sensor with the same channels.",
-                hint="Evaluate them apart.",
+                f"The recordings {first.name!r} of {first.sensor.name} and {meta.name!r} of {meta.sensor.name} differ "
+                "in their sensor or its channels.",
+                hint="Evaluate the recordings of each sensor separately.",
             )
         if any(one.meta.name == meta.name and np.array_equal(one.X, table.X, equal_nan=True) for one in tables):
-            raise DataError(f"The recording {meta.name!r} is given twice: {path} holds it too.", hint="Leave one out.")
+            raise DataError(f"The recording {meta.name!r} is given twice, also as {path}.", hint="Leave one file out.")
         features = names
         tables.append(table)
         paths.append(path)
@@ -193,7 +193,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         why = ", ".join(f"{number} {what}" for what, number in counts.items())
         raise DataError(
             f"No recording is left to evaluate{f': {why}' if why else ''}.",
-            hint="See what was left out with `tactbench inspect`; --include-incomplete takes incomplete ones.",
+            hint="List the reasons with `tactbench inspect`, or add --include-incomplete for incomplete recordings.",
         )
     target, labelled = _target_name(task), np.concatenate([table.labelled for table in tables])
     if not labelled.any():
@@ -201,11 +201,11 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         if apart is not None:
             raise DataError(
                 f"No reading of any recording is near a {target} in time: in {apart.meta.name!r}, {apart.apart}.",
-                hint="Put both on one clock: is one of them in another time zone, or does it count from another start?",
+                hint="Correct the times of one stream: it may be in another time zone, or count from another start.",
             )
         raise NotApplicable(
             f"No recording has any {target}, which task {task.name!r} asks for.",
-            hint="State it in the mapping, or choose another task.",
+            hint="State this target in the mapping, or choose another task.",
         )
     if not labelled.all():
         counts[f"of {len(labelled)} rows have no {target} and were left out"] = int((~labelled).sum())
@@ -223,7 +223,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
 
 
 def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:
-    """Return the findings in a recording, without those of streams and channels that `task` does not look at."""
+    """Return the findings in a recording, except findings about streams and channels that `task` does not use."""
     streams = {*feature_streams(recording, task), *(stream.name for stream in recording.meta.reference)}
     channels = {*features, *(channel.name for stream in recording.meta.reference for channel in stream.channels)}
     return [
@@ -235,7 +235,10 @@ def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> l
 
 
 def _in_some(seen: Mapping[str, Mapping[str, str]], n: int) -> Iterator[str]:
-    """Yield the finding of each check, and in how many of `n` recordings; `seen` has messages by check, recording."""
+    """Yield one text for each check: its message, and how many of `n` recordings have it.
+
+    `seen` maps the name of a check to messages by the name of the recording.
+    """
     for by_name in seen.values():
         (name, message), *_ = by_name.items()
         such = f", such as {name}" if len(set(by_name.values())) > 1 else ""
@@ -243,10 +246,7 @@ def _in_some(seen: Mapping[str, Mapping[str, str]], n: int) -> Iterator[str]:
 
 
 def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[str]:
-    """Yield the recordings without a usable row, and the share of unusable rows of the others.
-
-    A missing label is no lost row: it was left out on purpose.
-    """
+    """Yield texts on recordings without a labelled row, and on rows (5 % or more) left out for missing samples."""
     out = [table for table in tables if not table.labelled.any()]
     if out:
         names = ", ".join(one.meta.name for one in out[:MOST_NAMED]) + (", …" if len(out) > MOST_NAMED else "")
@@ -264,7 +264,7 @@ def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[
 
 
 def alike(what: str, labels: Iterable[Any]) -> Iterator[str]:
-    """Yield labels that differ by case or spaces alone: they are probably one."""
+    """Yield a text for each set of labels that differ by case or spaces alone, and so are probably the same label."""
     by_letters: dict[str, list[str]] = {}
     for label in labels:
         by_letters.setdefault(_SPACES.sub("", str(label).casefold()), []).append(repr(label))
@@ -272,9 +272,9 @@ def alike(what: str, labels: Iterable[Any]) -> Iterator[str]:
 
 
 def _whole(table: Table, task: TaskSpec, target: str) -> Table:
-    """Return a recording that no group cuts, its target, if that is a channel, reduced to one number.
+    """Return a recording with only those group labels that are constant in it, so that no split can cut it.
 
-    Where it is to have one answer, one whose answer changes is refused.
+    If the task has one answer per recording, a channel target becomes one number, and a changing label is refused.
     """
     there = table.y[table.labelled]
     if task.answer_per == "recording" and isinstance(task.target, ChannelTarget) and len(there):
@@ -282,15 +282,15 @@ def _whole(table: Table, task: TaskSpec, target: str) -> Table:
         table = replace(table, y=np.full(len(table.y), number), labelled=np.ones(len(table.y), dtype=bool))
     elif task.answer_per == "recording" and len(np.unique(there)) > 1:
         raise NotApplicable(
-            f"Task {task.name!r} asks one answer of each recording, and {target} changes within {table.meta.name!r}.",
-            hint="Cut the recordings where it changes (`recording` in the mapping), or ask a task of single samples.",
+            f"Task {task.name!r} has one answer per recording, but {target} changes within {table.meta.name!r}.",
+            hint="Cut recordings where it changes (`recording` in the mapping), or choose a task on single samples.",
         )
     constant = {name: column for name, column in table.groups.items() if len(np.unique(column)) < 2}
     return replace(table, groups=constant)
 
 
 def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[tuple[str, ...], Table]:
-    """Return the names of a recording's features, and its rows; of a classification `y` are the labels themselves."""
+    """Return the names of a recording's features, and its table; `y` of a classification holds labels, not indices."""
     meta = recording.meta
     streams = [recording.read(name) for name in feature_streams(recording, task)]
     clock = streams[0]
@@ -350,17 +350,17 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
 
 
 def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> None:
-    """Raise DataError for numbers of any shape whose squares cannot be summed; NaN is none."""
+    """Raise DataError if a number, in an array of any shape, is so large that sums of squares overflow; ignore NaN."""
     largest = float(np.max(np.abs(values), initial=0.0, where=~np.isnan(values)))
     if largest > LARGEST:
         raise DataError(
-            f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
-            hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
+            f"In recording {meta.name!r}, {name} reaches {largest:.3g}; at most {LARGEST:g} is allowed.",
+            hint="If this number means a missing sample, state it under `sentinels` in the mapping.",
         )
 
 
 def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]) -> None:
-    """Count the samples and rows that are kept although they are flagged."""
+    """Add to `counts` the samples flagged as saturated or suspect, and the rows after a gap, which are all kept."""
     if stream.quality is None:
         return
     quality = stream.quality[:, picked]
@@ -376,7 +376,7 @@ def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]
 def _own_readings(
     stream: StreamData, clock: StreamData, picked: Sequence[int], values: FloatArray, counts: Counter[str]
 ) -> StreamReadings:
-    """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
+    """Return the `picked` columns of one stream at its own times, in seconds since the first row of `clock`."""
     whole = ~np.isnan(values).any(axis=1)
     if stream is not clock and not whole.all():
         counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
@@ -394,7 +394,7 @@ def _own_readings(
 
 
 Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
-"""Targets, and a mask of those that are there."""
+"""(n,) or (n, components) targets of rows, and an (n,) mask, True where a row has a target."""
 
 
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
@@ -410,22 +410,22 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
 
 
 def _channels_of(task: TaskSpec) -> tuple[ChannelTarget, ...]:
-    """Return the target channels of a task; none where its target is a label or slip."""
+    """Return the target channels of a task; an empty tuple if the target is a label or slip."""
     if isinstance(task.target, VectorTarget):
         return task.target.components
     return (task.target,) if isinstance(task.target, ChannelTarget) else ()
 
 
 def _as_numbers(found: Labels, name: str, recording: str) -> Labels:
-    """Return labels, which a mapping gives as texts, as numbers."""
+    """Return labels converted from texts, as a mapping gives them, to numbers; NaN where a row has no label."""
     values, there = found
     numbers = np.full(len(values), np.nan)
     try:
         numbers[there] = values[there].astype(np.float64)
     except ValueError as error:
         raise DataError(
-            f"In recording {recording!r}, a label {name!r} is no number: {error}.",
-            hint="Ask for a class, or correct it in the mapping.",
+            f"In recording {recording!r}, a label {name!r} is not a number: {error}.",
+            hint="Choose a classification task, or correct the label in the mapping.",
         ) from error
     return numbers, there
 
@@ -441,7 +441,7 @@ def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
 
 
 def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, npt.NDArray[np.str_]]:
-    """Return labels by which rows can be kept together; the target is none of them."""
+    """Return (n,) labels of the rows by name, by which a split can keep rows together, without the task's target."""
     n = len(data.data)
     constant = {
         "session": meta.session,

@@ -1,4 +1,4 @@
-"""The delay from a change at the skin to the answer that reflects it, part by part, and the duration of calls."""
+"""Parts of the delay from a change at the sensor's skin to the answer that includes it, and the duration of calls."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from tactbench.core.spec.task import TaskSpec
 
 T = TypeVar("T")
 Clock = Callable[[], float]
-"""Seconds, monotonic."""
+"""Function that returns the time in seconds, which never decreases."""
 
 RATE_TOLERANCE = 0.01
-"""Relative difference of rates that is remarked: rates are stated to two or three digits."""
+"""Relative difference of two rates above which a remark is made: rates are stated to two or three digits."""
 
 SLOWEST_S = 1.0
-"""Interval beyond which rows are single readings, such as one a press, which have no sampling interval (assumed)."""
+"""Interval [s] above which rows are taken as single readings (one per press), without a sampling interval (assumed)."""
 NO_LINK = "link delay unknown: an answer delay is without it"
 NO_RATE = "answer delay unknown: the recordings state no sampling rate"
 AT_LEAST, AT_MOST = 20, 200
 BUDGET_S = 0.3
 CALLS_OF_P95 = 200
-"""Fewer calls have too few beyond their 95th percentile (ten of 200) to state it; the largest is stated instead."""
+"""Number of timed calls from which on a 95th percentile is stated: ten of 200 calls are beyond it."""
 RECORDINGS_TIMED = 3
-"""Recordings whose frames are timed: each has hundreds of them."""
+"""Number of recordings on which the features of frames are timed; each has hundreds of frames."""
 
 
 def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -52,21 +52,21 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
     Parameters
     ----------
     k
-        Rows that the mean filter, or a window, looks back.
+        Number of earlier rows that the mean filter, or a window, includes.
 
     Returns
     -------
     dict, tuple
-        ``sampling``: one interval of the slowest stream used, at the sensor's own rate: a change just after a sample
-        waits that long for the next one. Where the sensor states no rate, or its clock a slower one, the interval of
-        the recordings. Of frames the wait for the next frame, where that is longer.
-        ``link``: as the sensor's spec states it.
+        ``sampling``: one sampling interval of the slowest stream used, the longest time from a change to the next
+        sample. The interval is that of the sensor's own rate; if the sensor states no rate, or the recorded times show
+        a slower one, that of the recordings. For frames, the step between frames if that is longer.
+        ``link``: the link delay that the sensor's spec states.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
         samples has linear phase of slope (n - 1) / 2; Oppenheim and Schafer, Discrete-Time Signal Processing, section
-        5.7). Samples that a protocol drops are not counted, nor the shorter windows at the start of a recording. Of
-        frames half their length; of the reference none, since its last sample is looked at alone. Of recordings that
-        are answered whole, the time that one is listened to.
-        A part that is not known is absent; answers that look at no reading have none.
+        5.7). Samples that a protocol drops are not counted, nor the shorter windows at the start of a recording. For
+        frames, half the frame's length, or 0 for an estimator that uses the reference's last sample. For a task with
+        one answer per recording, the time span of the samples used.
+        An unknown part is absent; for answers that use no reading the dict is empty.
     """
     task, rules, recorded = data.task, data.rules, data.recorded
     frames = task.answer_per == "frame"
@@ -125,24 +125,24 @@ def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[
 
 
 def answer_delay_ms(parts_ms: Mapping[str, float], looks_at: str) -> float | None:
-    """Return the sum of the parts; None where one that the answer needs is not known.
+    """Return the answer delay [ms], the sum of its parts; None if a part is unknown, other than ``link``.
 
-    An answer that looks at no reading needs ``prediction`` alone. Without ``link`` the sum is a lower bound.
+    An answer that uses no reading needs the part ``prediction`` only. Without ``link`` the sum is a lower bound.
     """
     needed = ("prediction", *(("sampling", "window", "features") if looks_at == "features" else ()))
     return sum(parts_ms.values()) if all(name in parts_ms for name in needed) else None
 
 
 def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
-    """Return the streams that carry features, first the one whose clock is that of the rows."""
+    """Return the streams with features in `data`; first the stream whose clock times the rows."""
     used = [one for one in meta.sensor.streams if any(channel.name in data.features for channel in one.channels)]
     return sorted(used, key=lambda one: all(channel.name != data.features[0] for channel in one.channels))
 
 
 def _row_interval_s(data: Dataset, rules: ProtocolSpec) -> float | None:
-    """Return the interval between rows, the longest of all recordings: the median of the clock's steps.
+    """Return the longest interval [s] between rows of a recording, taken as the median step of the clock.
 
-    Without a clock, or where rows are single readings, by the rate that the stream states; None where there is none.
+    Without a clock, or where rows are single readings, the stream's stated rate gives the interval; None without both.
     """
     found: list[float | None] = []
     for table in data.tables:
@@ -154,7 +154,7 @@ def _row_interval_s(data: Dataset, rules: ProtocolSpec) -> float | None:
 
 
 def _largest(values: Sequence[float | None]) -> float | None:
-    """Return the largest of some numbers; None if one of them is not known."""
+    """Return the largest of `values`; None if the sequence is empty or contains None."""
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) else None
 
@@ -183,10 +183,10 @@ def _length_s(stream: StreamReadings) -> float | None:
 
 
 def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k: int, clock: Clock) -> float | None:
-    """Return the median seconds that the features of one answer take, or None for an answer that looks at no reading.
+    """Return the median time [s] to compute the features of one answer; None for an answer that uses no reading.
 
-    Of a frame: those of a recording over its frames. A detector at work makes them frame by frame, in more calls. Of a
-    single row of `X`: taring, scaling and the mean over `k` + 1 readings, with the code that prepares whole sets.
+    For frames, the time for all frames of a recording over their number; a detector in use needs more calls, one for
+    each frame. For a row of `X`, the time to tare, scale and average `k` + 1 readings by the code for whole sets.
     """
     task, rules, tables = data.task, data.rules, data.recorded.tables
     if task.answer_per == "frame" and estimator.looks_at in ("features", "reference"):
@@ -214,16 +214,16 @@ def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k:
 
 
 def single_row_latency_s(model: Estimator, X: FloatArray, clock: Clock) -> FloatArray:
-    """Return (calls,) seconds of ``predict`` on one row whose features are ready.
+    """Return the (calls,) durations [s] of calls of ``predict`` on one row each, whose features are ready.
 
-    At least 20 calls and at most 200, within 0.3 s where 20 take less; the first is not counted. Rows are spread
-    over `X`, so that a model that answers some rows faster is not flattered.
+    From 20 to 200 calls are made, and no further ones after 0.3 s; one call before is not counted. Rows are spread
+    over `X`, because a model may answer some rows faster than others.
     """
     return calls_s(len(X), lambda place: X[place : place + 1], model.predict, clock)
 
 
 def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
-    """Return the 95th percentile in ms, None for fewer than 200 calls, and the largest."""
+    """Return the 95th percentile [ms] of durations [s], None for fewer than 200 calls, and the largest [ms]."""
     enough = len(spent_s) >= CALLS_OF_P95
     return float(1e3 * np.quantile(spent_s, 0.95)) if enough else None, float(1e3 * spent_s.max())
 
@@ -235,7 +235,7 @@ def calls_s(
     clock: Clock,
     at_most: int = AT_MOST,
 ) -> FloatArray:
-    """Return (calls,) seconds of `work` on the values that `given` has for places spread over `rows`."""
+    """Return the (calls,) durations [s] of ``work(given(i))``, for row numbers i spread over `rows` rows."""
     places = np.linspace(0, rows - 1, at_most).astype(int)
     work(given(places[0]))  # the first call of a library takes longer
     spent: list[float] = []
@@ -250,7 +250,7 @@ def calls_s(
 
 
 def peak_rss_mb() -> float | None:
-    """Return the largest resident memory of this process so far, MB; None where the system does not report it."""
+    """Return the largest resident memory of this process so far [MB]; None if the system does not report it."""
     try:
         import resource
     except ImportError:

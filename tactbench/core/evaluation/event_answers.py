@@ -1,4 +1,4 @@
-"""Alarms from a detector's score of each frame, the events that they hit, and the figures of a row."""
+"""Turn a detector's scores of frames into alarms, match alarms with events, and compute the figures of a result."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec
 
 OTHER_SCALES = {0.5: "halved", 2.0: "doubled"}
-"""Other scales of the label thresholds, and their words."""
+"""Further factors on the thresholds of the slip labels, and the word for each factor in reports."""
 BOUNDS_PER_MINUTE = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""False alarms a minute on validation recordings; a threshold is chosen for each bound to show the cost of latency."""
+"""Upper bounds of false alarms per minute on validation recordings; for each bound, a threshold is chosen."""
 
 
 class Scored(NamedTuple):
-    """A detector's score of every frame of one recording."""
+    """A detector's scores of all frames of one recording, with the slip reference of that recording."""
 
     place: int
-    """which recording of the dataset"""
+    """Index of the recording in the data set."""
     t_ns: IntArray
-    """(n,) ends of all frames, those without an answer too"""
+    """(n,) end of each frame [ns], including frames without an answer."""
     score: FloatArray
-    """(n,) NaN: no answer"""
+    """(n,) score of each frame; NaN for a frame without an answer."""
     reference: SlipReference
     thresholds: tuple[float, ...] = ()
-    """of a test recording: its fold's, and those of `BOUNDS_PER_MINUTE` unless the detector has one of its own"""
+    """The fold's threshold, then one for each of `BOUNDS_PER_MINUTE` unless the detector has its own; else ()."""
 
     def truth(self, scale: float = 1.0) -> GroundTruth:
-        """Return the events, under label thresholds times `scale`; none before the first frame counts."""
+        """Return the events from the first frame on, labelled by slip thresholds multiplied by `scale`."""
         span = int(self.t_ns[0]), int(self.t_ns[-1]) + 1
         events = self.reference.labels[scale].gross_ns
         events = events[(events[:, 0] >= span[0]) & (events[:, 0] < span[1])]
@@ -56,7 +56,7 @@ class Scored(NamedTuple):
 
 @dataclass(frozen=True)
 class EventRules:
-    """The rules by which a detector's scores become alarms, and alarms become figures."""
+    """Rules that turn a detector's scores into alarms, and alarms into figures such as recall and latency."""
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
@@ -65,14 +65,14 @@ class EventRules:
 
     @classmethod
     def of(cls, task: TaskSpec, own_threshold: float | None) -> EventRules:
-        """Return the rules of a task of events."""
+        """Return the rules of an event detection task; `own_threshold` is the detector's own threshold, or None."""
         assert task.alarms is not None
         assert task.max_false_alarms_per_minute is not None
         hop_ns = nanoseconds(slip_target(task).hop_s)
         return cls(task.alarms, task.max_false_alarms_per_minute, own_threshold, hop_ns)
 
     def scored(self, part: Part, score: FloatArray, data: Dataset) -> list[Scored]:
-        """Return the scores of a set, recording by recording."""
+        """Return the scores of the frames of a set, divided by recording."""
         found = []
         for place in np.unique(part.recording).tolist():
             mine = part.recording == place
@@ -85,7 +85,7 @@ class EventRules:
         return found
 
     def choose(self, curve: ThresholdCurve | None) -> tuple[float, ...]:
-        """Return the threshold of a fold, then those of all bounds; of a detector that has a threshold this alone."""
+        """Return a fold's threshold, then one for each of `BOUNDS_PER_MINUTE`; or only the detector's own threshold."""
         if self.own_threshold is not None:
             return (self.own_threshold,)
         curve, bounds = (
@@ -98,15 +98,15 @@ class EventRules:
             raise DataError(
                 "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
                 "alarms on.",
-                hint="Give validation recordings of both (label `event: disturbance`), or another split.",
+                hint="Add validation recordings with slip and with `event: disturbance`, or choose another split.",
             ) from error
 
     def alarms(self, one: Scored, number: int = 0) -> IntArray:
-        """Return when alarms at a threshold of a recording are known, without the time that computing takes."""
+        """Return the (m,) times [ns] of alarms at threshold `number` of a recording, without the computing time."""
         return alarms(one.t_ns, one.score >= one.thresholds[number], self.policy)
 
     def curve(self, several: Sequence[Scored]) -> ThresholdCurve:
-        """Return the curve of recordings; that of a detector with a threshold of its own has this one point."""
+        """Return scores over all thresholds; for a detector with a threshold of its own, at that threshold only."""
         own = self.own_threshold
         scores = [one.score if own is None else np.where(one.score >= own, 1.0, np.nan) for one in several]
         return threshold_curve(
@@ -115,10 +115,10 @@ class EventRules:
         )
 
     def items(self, several: Sequence[Scored], curve: ThresholdCurve, data: Dataset, fold: int) -> Answers:
-        """Return the summands of the area: each event, with the share of the rates at which it is hit.
+        """Return one answer for each event: the share of false-alarm rates, up to a fixed limit, at which it is hit.
 
-        A line of each recording, which is no event, stands before its events, so that each recording has a part in the
-        interval. The row is the last frame before the onset, the time that of the onset.
+        The mean of these shares is the area under recall over rate. Before the events of a recording comes a line for
+        the recording itself (true 0), to include it in the interval. Row: last frame before the onset; time: the onset.
         """
         onsets = [one.truth().event_ns[:, 0] for one in several]
         if not sum(map(len, onsets)):
@@ -128,7 +128,7 @@ class EventRules:
                 found = curve.found_share(AREA_PER_MINUTE)
             except DataError as error:
                 raise DataError(
-                    "Recall against false alarms cannot be drawn: no disturbance to count false alarms on.",
+                    "The area under recall over false alarms is undefined: no disturbance to count false alarms in.",
                     hint="Give every fold test recordings of disturbances (label `event: disturbance`).",
                 ) from error
         shares = np.split(found, np.cumsum([len(one) for one in onsets])[:-1])
@@ -145,12 +145,12 @@ class EventRules:
         return Answers(true, hits, place, row, number, np.asarray(at_ns * 1e-9, dtype=np.float64), none)
 
     def figures(self, tested: Sequence[Scored], compute_s: float | None) -> dict[str, float]:
-        """Return figures of the events of all test recordings, without those that are undefined.
+        """Return figures such as precision, misses and latency over all test recordings, except undefined figures.
 
         Parameters
         ----------
         compute_s
-            Seconds from the end of a frame's window to its answer; None: not measured, latencies are without it.
+            Computing time [s] from a frame's end to its answer, added to latencies; None if it was not measured.
         """
         late_s = compute_s or 0.0
         moved = []
@@ -182,7 +182,7 @@ class EventRules:
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
     def operating_points(self, tested: Sequence[Scored], compute_s: float | None) -> list[dict[str, float]]:
-        """Return figures of test recordings at thresholds chosen on validation for several bounds of false alarms."""
+        """Return F1, recall, false alarms and latency on test recordings at the threshold for each bound."""
         found = []
         for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else (), 1):
             scores = self._scores(tested, number)
@@ -204,7 +204,7 @@ def _hits(scores: EventScores, late_s: float) -> dict[str, float]:
 
 
 def _frame_scores(tested: Sequence[Scored]) -> dict[str, float]:
-    """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
+    """Return macro F1 and balanced accuracy of gross slip, over frames with a label and an answer."""
     pairs = []
     for one in tested:
         state = one.reference.state(one.t_ns)
@@ -214,7 +214,7 @@ def _frame_scores(tested: Sequence[Scored]) -> dict[str, float]:
 
 
 def state_figures(tested: Answers, data: Dataset) -> dict[str, float]:
-    """Return the scores of the same answers against states of halved and doubled thresholds of labels."""
+    """Return the scores of answers against slip states labelled by halved and by doubled thresholds."""
     found: dict[str, float] = {}
     for scale, text in OTHER_SCALES.items():
         pairs = []
@@ -230,7 +230,7 @@ def state_figures(tested: Answers, data: Dataset) -> dict[str, float]:
 
 
 def _scores_of(pairs: Sequence[tuple[IntArray, IntArray]], n_classes: int, text: str) -> dict[str, float]:
-    """Return scores of frames from states and answers, recording by recording; none without a frame."""
+    """Return macro F1 and balanced accuracy over (states, answers) of recordings; empty without a frame."""
     y, predicted = (np.concatenate(each) for each in zip(*pairs, strict=True))
     names = {"macro_f1": "macro F1", "balanced_accuracy": "balanced accuracy"} if y.size else {}
     return {text.format(words): METRICS[name].of(y, predicted, n_classes) for name, words in names.items()}

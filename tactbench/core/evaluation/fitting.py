@@ -1,4 +1,4 @@
-"""Estimators are made, fitted and used; their hyper-parameters are chosen on data of neither training nor test."""
+"""Make, fit and apply estimators, and choose their hyper-parameters without the test data."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Build = Callable[[Mapping[str, Any]], Estimator]
-"""Parameters -> a fresh estimator."""
+"""Function from parameters to a new, unfitted estimator."""
 
 
 def builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
-    """Return a function that makes a fresh estimator from parameters, one for each component of a vector.
+    """Return a function that makes a new estimator from parameters; for a vector target, one for each component.
 
-    Its imports are done, and one has been made on trial. Raises UsageError if the estimator cannot answer this kind of
-    question, or a parameter is not one of its own.
+    The estimator's code is imported, and one estimator is made on trial. Raises UsageError if the estimator is not for
+    this kind of task, or has no parameter of a given name.
     """
     if task.kind not in estimator.kinds:
         raise UsageError(
-            f"The estimator {estimator.name!r} does {' and '.join(estimator.kinds)}; task {task.name!r} is "
-            f"{task.kind}.",
-            hint="See what others do with `tactbench list estimators`.",
+            f"The estimator {estimator.name!r} is for {' and '.join(estimator.kinds)}, but task {task.name!r} is of "
+            f"kind {task.kind}.",
+            hint="Choose another estimator; `tactbench list estimators` shows the kinds of tasks of each.",
         )
     for name in params:
         if name not in estimator.params:
@@ -61,34 +61,34 @@ def builder(
 
 
 def one_model_a_component(task: TaskSpec, build: Build) -> Build:
-    """Return `build`; where the task asks for a vector, a function that makes an estimator for each component."""
+    """Return `build`, or for a vector target a function that makes a :class:`PerComponent` of such estimators."""
     return (lambda chosen: PerComponent(lambda: build(chosen))) if isinstance(task.target, VectorTarget) else build
 
 
 class PerComponent:
-    """A model for each component of a vector, each made by `build` and fitted by itself."""
+    """Estimator of a vector: one model for each component, each made by `build` and fitted separately."""
 
     def __init__(self, build: Callable[[], Estimator]) -> None:
         self._build = build
         self._models: list[Estimator] = []
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any], **params: Any) -> PerComponent:
-        """Fit a model to X (n, p) and each column of y (n, components)."""
+        """Fit one model for each column of y (n, components) to X (n, p) and that column."""
         self._models = [self._build() for _ in range(y.shape[1])]
         for model, column in zip(self._models, y.T, strict=True):
             model.fit(X, np.ascontiguousarray(column), **params)
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n, components) answers to X (n, p)."""
+        """Return the (n, components) predictions for X (n, p)."""
         return np.column_stack([model.predict(X) for model in self._models])
 
 
 def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str], **params: Any) -> None:
-    """Fit `model` to X (n, p) and y (n,) or (n, components), with other parameters of its ``fit``.
+    """Fit `model` to X (n, p) and y (n,) or (n, components), with `params` as further arguments of ``fit``.
 
-    A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row. Raises
-    DataError if the estimator refuses the data.
+    Warnings, such as of a solver that did not converge, are counted in `counts` under the estimator's `name`. Raises
+    DataError if ``fit`` fails on the data.
     """
     refused = (ValueError, ArithmeticError, *((TypeError,) if params else ()))
     with warnings.catch_warnings(record=True) as caught:
@@ -108,10 +108,10 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
 
 
 def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Callable[[Part], Any]]:
-    """Return functions from a training set to further parameters of an object's ``fit``, by scikit-learn's names.
+    """Return functions from a training set to further arguments of the estimator's ``fit``, by scikit-learn's names.
 
-    `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
-    the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
+    These are the arguments `given` (a text under ``groups`` or ``STEP__groups`` names a label of the recordings), and
+    ``groups`` if the estimator, or a step of it, searches by cross-validation or has such an argument of ``fit``.
     """
 
     def of(name: str, value: Any) -> Callable[[Part], Any]:
@@ -137,9 +137,9 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
 def answers(
     model: Estimator, X: FloatArray, name: str, n_classes: int, components: tuple[int, ...] = ()
 ) -> npt.NDArray[Any]:
-    """Return the answers of `model` to X (n, p): (n,) numbers, or class indices below `n_classes` unless it is 0.
+    """Return the predictions of `model` for X (n, p): (n,) numbers, or class indices below a non-zero `n_classes`.
 
-    Each answer has the shape `components`, (d,) where it is a vector. Anything else raises PluginContractError.
+    For vectors of d components, with `components` (d,), the shape is (n, d). Other answers raise PluginContractError.
     """
     given = np.asarray(model.predict(X))
     wrong = ""
@@ -150,7 +150,7 @@ def answers(
     elif not np.isfinite(given).all():
         wrong = f"{np.count_nonzero(~np.isfinite(given))} values that are NaN or infinite"
     elif n_classes and not np.isin(given, np.arange(n_classes)).all():
-        wrong = "numbers that are no class indices (is it a regressor?)"
+        wrong = "numbers that are not class indices (is the estimator a regressor?)"
     if wrong:
         expected = f"class indices below {n_classes}" if n_classes else "finite numbers"
         raise PluginContractError(
@@ -161,15 +161,15 @@ def answers(
 
 
 def answers_to(part: Part, model: Estimator, descriptor: EstimatorDescriptor, n_classes: int) -> npt.NDArray[Any]:
-    """Return the answers of `model` to the rows of a set, as :func:`answers` does."""
+    """Return the predictions of `model` for the rows of a set, checked by :func:`answers`."""
     return answers(model, features_of(part, descriptor), descriptor.name, n_classes, part.y.shape[1:])
 
 
 def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
-    """Return the last row of each recording, and its answer, combined from the (n,) answers to its rows.
+    """Return the last row of each recording, and one answer per recording, combined from the (n,) answers to its rows.
 
-    That is the commonest class, of equals the first; where `n_classes` is 0, the mean. Rows are in order of recording
-    and time.
+    The answer is the most frequent class (the first of equally frequent ones), or the mean if `n_classes` is 0. Rows
+    must be in order of recording and time.
     """
     places, code, counts = np.unique(part.recording, return_inverse=True, return_counts=True)
     rows = taken(part, np.cumsum(counts) - 1)
@@ -182,17 +182,17 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
 
 @dataclass(frozen=True)
 class Choice:
-    """Parameters and window that were tried, and how well they did on the validation data."""
+    """Parameters and mean filter (over `k` + 1 rows) that were tried, and their score on validation data."""
 
     params: dict[str, Any]
     k: int
     score: float
     compared: tuple[Choice, ...] = ()
-    """of the one that was chosen: all in the order in which they were tried, it among them"""
+    """All choices in the order of trial, including this one; empty unless this choice was selected."""
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
-    """Return the features that the estimator may look at."""
+    """Return the (n, p) features for the estimator: readings, or (n, 1) row indices or zeros for a baseline."""
     if descriptor.looks_at == "time":
         return one.row.astype(np.float64)[:, None]
     if descriptor.looks_at == "nothing":
@@ -210,10 +210,10 @@ def select(
     metric: Metric,
     counts: Counter[str],
 ) -> Choice | None:
-    """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
+    """Choose the estimator's parameters and mean filter from its grid for one fold; None if there is nothing to choose.
 
-    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts`
-    gets the fits with a warning.
+    Parameters `given` by the user are not searched, and the test rows of `assignment` are not used. Fits with a
+    warning are counted in `counts`.
     """
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:
@@ -234,8 +234,8 @@ def select(
             pairs.append([(rows, scale_of(protocol, train, rows)) for rows in (train, other)])
     if not pairs:
         raise DataError(
-            f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters on: some to learn from and "
-            f"some to check with are needed, {gap} rows apart where one recording must serve both.",
+            f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters: rows for fitting and for "
+            f"validation are needed, {gap} rows apart if they are of the same recording.",
             hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
         )
     n_classes = len(data.classes)

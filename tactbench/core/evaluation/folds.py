@@ -1,4 +1,4 @@
-"""From recordings to folds: rows of X and y, and which of them train and test."""
+"""Turn recordings into rows of features X and labels y, and divide the rows into folds for training and test."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
-"""The descriptor of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
+"""Descriptor for an estimator given as a Python object: it uses all features, and has no parameters to choose."""
 
 
 @dataclass(frozen=True, repr=False)
 class TaskData:
-    """The rows of a task under a protocol, and which of them train and test.
+    """The rows of a task under a protocol, and the folds that divide them into training and test rows.
 
-    `X` is tared, and neither scaled nor filtered: these are fitted on each fold's training rows.
+    `X` is tared if the protocol does so, but not scaled or filtered, since a fold's scale is that of its training rows.
     """
 
     task: TaskSpec
     rules: ProtocolSpec
     split: str
     recorded: Dataset
-    """the recordings as they were read"""
+    """Recordings as they were read, one row for each sample."""
     data: Dataset
-    """the same as rows to be answered: samples, windows of them, frames, or one row a recording"""
+    """The same recordings with one row for each answer: a sample, window, frame or whole recording."""
     assignments: tuple[Assignment, ...]
-    """the rows that train, test and validate, fold by fold"""
+    """Training, test and validation rows of each fold."""
     held_back: bool = False
-    """thresholds are chosen on a share of the training groups: no recording has the role validation"""
+    """True if thresholds are chosen on a part of the training groups, as no recording has the role validation."""
     unit: str | None = "session"
-    """name of the groups that are held out, which intervals are over; None: the caller's own split names none"""
+    """Name of the group labels over which intervals are computed; None for the caller's own split without groups."""
     stamps: tuple[str, ...] = ()
-    """leaks of the caller's own split"""
+    """Warnings of leaks from training to test in the caller's own split."""
     window: int = 0
-    """rows of a window; 0: rows are answered one by one"""
+    """Number of rows in a window; 0 without windows."""
 
     def __repr__(self) -> str:
         counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
@@ -63,17 +63,17 @@ class TaskData:
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features), or (n, window, features), of the labelled rows that the protocol keeps."""
+        """Return the (n, features), or (n, window, features), readings of the labelled rows that the protocol keeps."""
         return self.data.column(lambda table: tared(table) if self.rules.tare else table.X, self._there)
 
     @property
     def y(self) -> npt.NDArray[Any]:
-        """Return (n,) numbers or class indices, (n, components) of a vector."""
+        """Return the (n,) target numbers or class indices of the rows of `X`, or (n, components) of a vector target."""
         return self.data.column(lambda table: table.y, self._there)
 
     @property
     def groups(self) -> npt.NDArray[Any]:
-        """Return (n,) labels that the split keeps apart; those of the session where it keeps no group apart."""
+        """Return the (n,) group labels by which the split keeps rows together; session names if it has none."""
         return self.per_row("groups", self.assignments[0].groups)
 
     @property
@@ -83,17 +83,17 @@ class TaskData:
 
     @property
     def classes(self) -> tuple[Any, ...]:
-        """Return the labels that class indices in `y` stand for; nothing of a regression."""
+        """Return the class labels in order of the class indices in `y`; an empty tuple for regression."""
         return self.data.classes
 
     @property
     def folds(self) -> list[tuple[IntArray, IntArray]]:
-        """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
+        """Return (training, test) indices of rows of `X` for each fold, as scikit-learn expects for `cv`."""
         there = self._there
         return [(np.flatnonzero(one.train[there]), np.flatnonzero(one.test[there])) for one in self.assignments]
 
     def per_row(self, argument: str, given: Any) -> npt.NDArray[Any]:
-        """Return (n,) values, one for each row of `X`: an array that was given, or the labels of a name."""
+        """Return (n,) values, one for each row of `X`: `given` if it is such an array, or the labels that it names."""
         if isinstance(given, str):
             known = set.intersection(*(set(table.groups) for table in self.data.tables))
             if given not in known:
@@ -105,7 +105,7 @@ class TaskData:
         return column
 
     def spread(self, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return values of the rows of `X` at their places among all rows, which else have an empty one."""
+        """Return an array over all rows of `data`: the given values at the rows of `X`, zero or "" elsewhere."""
         there = self._there
         found = np.zeros((len(there), *column.shape[1:]), dtype=column.dtype)
         found[there] = column
@@ -127,27 +127,27 @@ def load_task(
     window: int = 0,
     step: int = 1,
 ) -> TaskData:
-    """Return recordings as rows and folds.
+    """Turn recordings into rows of features and labels, and divide these rows into folds.
 
     Parameters
     ----------
     recordings
-        Files, or a data set read from them.
+        Recording files, or a data set read from such files.
     split
-        Name of the split; None: the task's first that the recordings can serve.
+        Name of the split, or the caller's own folds; None for the first of the task's splits that is possible.
     estimator
-        Decides the features of frames, the gap between training and test where recordings are cut in time (its longest
-        window), and whether a threshold has to be chosen.
+        Determines the features of frames, the gap between training and test where recordings are cut in time (the
+        longest mean filter of the estimator), and whether a threshold is to be chosen.
     seed
-        Of split ``shuffled``.
+        Seed of the random split ``shuffled``.
     window, step
-        Rows of a window, 0 for none, and from its end to that of the next; see :func:`windowed`.
+        Number of rows in a window, 0 without windows; rows between the ends of two windows; see :func:`windowed`.
 
     Raises
     ------
     NotApplicable
-        If the estimator looks at the time and a recording states none: the order of its rows means nothing. If the
-        protocol thins samples or states a window, and the task is not answered sample by sample.
+        If the estimator uses the time and a recording has no clock. If the protocol thins samples or states a mean
+        filter, and the task has answers to frames or summaries in place of samples.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
     rules = protocol_called(protocol)
@@ -155,13 +155,13 @@ def load_task(
     frames = task.answer_per == "frame"
     if (rules.every > 1 or rules.k is not None) and (frames or is_summarised(task, rules)):
         raise NotApplicable(
-            f"Protocol {protocol!r} is for answers to single samples; {task.name} is answered by summaries of many.",
+            f"Protocol {protocol!r} is for answers to single samples; {task.name} has answers to summaries of samples.",
             hint=f"Use protocol `{without_options(protocol)}`.",
         )
     recorded = thinned(recorded, rules.every)
     name = split.name if isinstance(split, OwnSplit) else choose_split(task, rules, recorded, split)
     if isinstance(split, OwnSplit) and (rules.roles_only or rules.first_row_only):
-        raise NotApplicable(f"Protocol {protocol!r} has a split of its own, not {name}.", hint="Use `deployable`.")
+        raise NotApplicable(f"Protocol {protocol!r} has its own split, not {name}.", hint="Use protocol `deployable`.")
     if rules.tare:
         tare_s(recorded)  # refuses recordings of which some only can be tared
     data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
@@ -184,14 +184,14 @@ def load_task(
         made = replace(made, assignments=parted, held_back=True)
     if estimator.looks_at == "time" and any(meta.clock == "none" for meta in recorded.metas):
         raise NotApplicable(
-            f"{estimator.name} looks at the time alone, which not all of these recordings state.",
-            hint="State the clock in the mapping.",
+            f"The estimator {estimator.name} uses the time alone, but not all of these recordings have a clock.",
+            hint="State the clock in the mapping, or leave the estimator out.",
         )
     return made
 
 
 def _with_own_folds(made: TaskData, own: OwnSplit) -> TaskData:
-    """Return rows with the caller's groups and folds, and a stamp where a group, or a recording, is on both sides."""
+    """Return `made` with the caller's groups and folds, and a warning if a group or recording is in train and test."""
     name, groups = "recording", None
     apart_by = made.per_row("groups", name)
     if own.groups is not None:

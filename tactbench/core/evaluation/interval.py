@@ -1,4 +1,4 @@
-"""The interval of a score over the units that a split holds out: sessions, objects, places or trials."""
+"""Confidence interval of a score over the units that a split holds out: sessions, objects, placements or trials."""
 
 from __future__ import annotations
 
@@ -16,52 +16,52 @@ from tactbench.core.spec.row import plural
 
 LEVEL = 0.95
 ENOUGH_UNITS = 5
-"""Units that an interval needs: fewer do not show how units differ."""
+"""Smallest number of units for an interval: fewer units do not show how units differ."""
 FURTHEST = 10.0
-"""Multiple of an error from which on the upper end of its interval is open: so few units may put no bound to it."""
+"""Multiple of an error above which the upper end of the error's interval is left open: few units may not bound it."""
 _MOST_FREEDOM = 1e9
-"""Degrees of freedom beyond which t is normal to all digits."""
+"""Degrees of freedom above which Student's t equals the normal distribution to all digits."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Where a score may lie, and how that was found."""
+    """The 95 % confidence interval of a score, and the method of its computation."""
 
     low: float | None = None
-    """None: there are too few units for an interval"""
+    """Lower end; None if there are too few units for an interval."""
     high: float | None = None
-    """None, with a `low`: the data put no upper bound to an error"""
+    """Upper end; None if there is no interval, or if the data do not bound an error from above."""
     method: str = ""
 
 
 @dataclass(frozen=True)
 class ReplicateUnits:
-    """The units that a split holds out: sessions, objects or recordings."""
+    """The units that a split holds out, such as sessions or objects, and the unit of each test row."""
 
     name: str
-    """Word for one of them: session, object …"""
+    """Word for one unit, such as session or object."""
     codes: IntArray
-    """(n,) which one each row belongs to"""
+    """(n,) index in `labels` of the unit to which each test row belongs."""
     labels: tuple[str, ...]
-    """Labels by code"""
+    """Name of each unit."""
 
     def sums(self, rows: FloatArray) -> FloatArray:
-        """Return (units, m) sums of (n, m) summands over the rows of each."""
+        """Return the (units, m) sums of (n, m) summands over the rows of each unit."""
         out = np.zeros((int(self.codes.max()) + 1, rows.shape[1]))
         np.add.at(out, self.codes, rows)
         return out
 
     def enough(self, y: npt.NDArray[Any], n_classes: int) -> bool:
-        """Return whether there are enough units for an interval, of every class that occurs in (n,) labels."""
+        """Return True if there are enough units for an interval, in all and with each class in the (n,) labels."""
         each = [y == one for one in range(n_classes)]
         own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
         return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
 
     def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
-        """Return (units,) numbers, equal for units that may stand in for each other.
+        """Return the (units,) index of each unit's stratum; the jackknife is computed within strata.
 
-        All of them, or class by class where each has one class only: a score without a class is that of another
-        question.
+        If each unit has rows of one class only, the units of each class are a stratum, as a score without a class
+        answers another question; otherwise all units are one stratum.
         """
         there = np.zeros((int(self.codes.max()) + 1, max(n_classes, 1)), dtype=bool)
         there[self.codes, y if n_classes else 0] = True
@@ -73,15 +73,15 @@ class ReplicateUnits:
 def score_interval(
     metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
 ) -> Interval:
-    """Return the interval of ``metric.of(y, predicted)``; no ends for fewer than five units, or of a class.
+    """Return the interval of ``metric.of(y, predicted)``, without ends if fewer than five units, in all or of a class.
 
     Notes
     -----
-    Each unit is left out in turn, those of one class standing in for each other only, and the interval is Student's
-    over units [1]_, on a scale that suits the metric (:func:`transform_of`). Errors have half the degrees of freedom,
-    since squares of offsets of units are long-tailed (Box 1953, Non-normality and tests on variances). Shares near 1
-    with few mistakes have ends from the binomial distribution [2]_, and those near 0 mirror them. docs/statistics.md,
-    section 2, gives the reasons; ``benchmarks/coverage.py`` measures the coverage.
+    Each unit is left out in turn (jackknife, within strata where units have one class each), and the interval is
+    Student's over units [1]_, on a scale that suits the metric (:func:`transform_of`). Errors have half the degrees of
+    freedom, since squared offsets between units are long-tailed (Box 1953, Non-normality and tests on variances).
+    Shares near 1 with few mistakes have ends from the binomial distribution [2]_, and shares near 0 mirrored ends.
+    docs/statistics.md, section 2, gives the reasons; ``benchmarks/coverage.py`` measures the coverage.
 
     References
     ----------
@@ -121,12 +121,12 @@ def score_interval(
 
 
 def _few(each: FloatArray) -> bool:
-    """Return whether (units,) counts are too few to show how units differ: two in all, or in under a third of them."""
+    """Return True if (units,) counts are too few to show how units differ: sum at most 2, or over two thirds are 0."""
     return bool(each.sum() <= 2 or np.count_nonzero(each) < len(each) / 3)
 
 
 def _few_mistakes(score: float, low: float, high: float, wrong: int, n: int) -> tuple[float, float]:
-    """Return the ends of the interval of a share, where `wrong` of n units hold its few mistakes."""
+    """Return the binomial ends of the interval of a share near 1, if `wrong` of `n` units have a mistake."""
     tail = 0.5 - LEVEL / 2
     low = (low if wrong else 1.0) * tail ** (1 / n)
     if not wrong:
@@ -138,7 +138,7 @@ def _few_mistakes(score: float, low: float, high: float, wrong: int, n: int) -> 
 def unit_scores(
     metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (units,) the score of each by itself, and (units,) those of all others together."""
+    """Return the (units,) scores on the rows of each unit, and the (units,) scores on all rows but that unit's."""
     if metric.function is not None:
         each = [unit.codes == code for code in range(len(unit.labels))]
         own, others = ([metric.of(y[mask ^ out], predicted[mask ^ out]) for mask in each] for out in (False, True))
@@ -148,37 +148,37 @@ def unit_scores(
 
 
 def own_scores(metric: Metric, sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return (units,) the score of each by itself; not finite where the metric of it is undefined."""
+    """Return the (units,) scores of single units from (units, m) sums; not finite where the metric is undefined."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return metric.score(sums, n_classes)
 
 
 def student_quantile(freedom: Any) -> FloatArray:
-    """Return how many standard errors a two-sided interval of 95 % reaches, for each of some degrees of freedom."""
+    """Return the half-width, in standard errors, of Student's two-sided 95 % interval for these degrees of freedom."""
     special = importlib.import_module("scipy.special")
     return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + LEVEL / 2))
 
 
 def two_sided_p(t: float, freedom: float) -> float:
-    """Return the probability of a value at least as far from 0 as `t`."""
+    """Return the probability that Student's t, with `freedom` degrees of freedom, is at least as far from 0 as `t`."""
     special = importlib.import_module("scipy.special")
     return float(2 * special.stdtr(min(freedom, _MOST_FREEDOM), -abs(t)))
 
 
 def influences(without: FloatArray, strata: IntArray) -> FloatArray:
-    """Return (…, replicates) whose sum of squares is the squared standard error of a score.
+    """Return (…, replicates) influences; their squares, summed over replicates, are a score's squared standard error.
 
     Parameters
     ----------
     without
-        (…, replicates) the score without each replicate.
+        (…, replicates) scores computed without each replicate.
     strata
-        (replicates,) which replicates may stand in for each other; two or more of each.
+        (replicates,) stratum index of each replicate; at least two replicates in each stratum.
 
     Notes
     -----
     The jackknife of Quenouille and Tukey, within strata as in Shao and Tu 1995, The jackknife and bootstrap, section
-    6.2. For a mean over replicates this is the usual standard error exactly, and no derivative of a metric is needed.
+    6.2. For a mean over replicates it equals the usual standard error, and no derivative of a metric is needed.
     """
     out = np.zeros_like(without)
     for one in np.unique(strata):
@@ -190,7 +190,7 @@ def influences(without: FloatArray, strata: IntArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class ScoreTransform:
-    """A monotone function of a score, and its inverse."""
+    """A monotone function of a score, on whose scale an interval is symmetric, and the inverse function."""
 
     name: str
     there: Callable[[Any], Any]
@@ -198,16 +198,16 @@ class ScoreTransform:
 
 
 def transform_of(metric: Metric, score: float, n: int) -> ScoreTransform:
-    """Return the scale of a metric on which Student's interval is to be made.
+    """Return the transform of a metric's score on whose scale Student's interval is symmetric.
 
-    The upper end of an error is infinite beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1
-    than half of one. Nothing is known of the range of a metric of the caller's own: its scale is its own.
+    The upper end of an error is infinite beyond ten times its `score`; a share of `n` rows is limited to the range
+    from 0.5/n to 1 - 0.5/n. A caller's own metric, whose range is unknown, is not transformed.
 
     Notes
     -----
-    A mean of squares from few sessions that is too low also has too narrow an interval, and the reverse; that of its
-    reciprocal does not. Shares near 0 or 1 have room on both sides on the scale of log-odds (Agresti 2013, Categorical
-    data analysis, section 3.1). Both are measured in ``benchmarks/coverage.py``.
+    If a mean of squares over few sessions is too low, its interval is too narrow, and the reverse; the interval of the
+    reciprocal does not have this fault. On the scale of log-odds, shares near 0 or 1 have room on both sides (Agresti
+    2013, Categorical data analysis, section 3.1). ``benchmarks/coverage.py`` measures the coverage of both.
     """
     if metric.function is not None:
         return ScoreTransform("its own scale", np.asarray, np.asarray)

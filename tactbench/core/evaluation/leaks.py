@@ -1,4 +1,4 @@
-"""Answers that a recording gives away: test rows among the training rows, and channels that are the target."""
+"""Find leaks: test rows that are also among the training rows, and feature channels that are copies of the target."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from tactbench.core.recording.health import MONOTONE, is_copy
 from tactbench.core.spec.row import LEAKS
 
 BLOCK = 16
-"""Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
+"""Number of consecutive rows that must be equal for a leak; a recording with fewer rows is one block."""
 CHANGES = 0.5
-"""Share of the rows of a block that must differ from the row before: sensors at rest repeat themselves."""
+"""Smallest share of rows in a block that differ from the row before; sensors at rest repeat the same row."""
 MOST_SHARED = 0.05
-"""Share of the test rows of a fold that is put up with. Two presses on a sensor with noise share none."""
+"""Largest share of a fold's test rows that may equal training rows; two presses on a noisy sensor share no row."""
 AT_REST = 4
-"""Distinct rows of a fold that may stand in training too: those of a sensor that nothing touches."""
+"""Largest number of distinct test rows that may equal training rows, as those of an untouched sensor do."""
 _Hashes = npt.NDArray[np.uint64]
 
 
 def copied_channels(data: Dataset) -> tuple[str, ...]:
-    """Return a stamp if a channel gives the target of a regression away, or its size, else nothing."""
+    """Return a warning that names the channels from which a regression's target, or its size, follows; else ()."""
     if data.classes:
         return ()
     X, y = (data.column(attrgetter(name), data.labelled) for name in ("X", "y"))
@@ -39,7 +39,7 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
 
 
 def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
-    """Return a stamp if readings of a fold's test set stand in its training set too, else nothing."""
+    """Return a warning if over 5 % of a fold's test rows are also in its training or validation set; else ()."""
     rows = [_mixed(table.X, table.force).sum(axis=1, dtype=np.uint64) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
@@ -65,19 +65,19 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
 
 
 def _learned(fold: Assignment) -> Mask:
-    """Return the rows that a fold trains or validates on."""
+    """Return a mask of the training and validation rows of a fold."""
     return fold.train if fold.validation is None else fold.train | fold.validation
 
 
 def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
-    """Return a stamp if rows without a clock, each a reading by itself, stand on both sides of a split."""
+    """Return a warning if over 5 % of a fold's test rows equal training rows, for data without clock; else ()."""
     if not all(one.meta.clock == "none" or len(one.row) == 1 for one in data.tables):
         return ()
     mixed = data.column(lambda table: _mixed(table.X, table.force, *([] if data.classes else [table.y])))
     rows, *halves = (mixed[:, start::step].sum(axis=1, dtype=np.uint64) for start, step in ((0, 1), (0, 2), (1, 2)))
 
     def shared(fold: Assignment) -> float:
-        """Return the share of the distinct test rows that training has too."""
+        """Return the share of a fold's distinct test rows that equal a training row; 0 for four or fewer."""
         met = np.isin(np.unique(rows[fold.test]), rows[_learned(fold)])
         return float(met.mean()) if met.sum() > AT_REST else 0.0
 
@@ -90,9 +90,9 @@ def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str,
 
 
 def _mixed(*columns: npt.NDArray[Any] | None) -> _Hashes:
-    """Return (n, columns) numbers; sums of them over columns are equal where rows are, and else hardly ever.
+    """Return (n, columns) hashes of numbers; rows are equal if their hashes summed over columns are equal.
 
-    Of readings and force, since a sensor without noise repeats itself where the reference does not.
+    The reference force is included, since a sensor without noise repeats its readings where the reference does not.
     """
     X = np.column_stack([one for one in columns if one is not None]).astype(np.float64)
     bits = np.ascontiguousarray(X + 0.0).view(np.uint64)  # adding 0 makes -0 and 0 one
@@ -101,7 +101,7 @@ def _mixed(*columns: npt.NDArray[Any] | None) -> _Hashes:
 
 
 def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
-    """Return a number for each block of consecutive rows that changes enough, the block's first row, and its length."""
+    """Return a hash of each block of consecutive rows that changes enough, its first row, and the length of blocks."""
     length = min(BLOCK, len(rows))
     if length < 2:
         return np.zeros(0, np.uint64), np.zeros(0, np.int64), length
@@ -112,5 +112,5 @@ def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
 
 
 def _factors(count: int) -> _Hashes:
-    """Return `count` odd numbers, always the same."""
+    """Return `count` random odd factors for hashes, the same in every call."""
     return np.random.default_rng(16).integers(0, 2**63, count, dtype=np.uint64) * np.uint64(2) + np.uint64(1)

@@ -1,6 +1,6 @@
-"""Metrics as sums over rows, so that a bootstrap adds up blocks instead of computing anew.
+"""Metrics as functions of sums over rows, so that the score of any part of the rows is computed from partial sums.
 
-Each metric turns rows into a few numbers that may be summed, and sums into a score.
+Each metric has one function from rows to summands, a few numbers per row, and one from their sums to a score.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ Score = Callable[[FloatArray, int], FloatArray]
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of merit."""
+    """A metric: the summands of each row, and the score as a function of their sums."""
 
     name: str
     kind: str
     rows: Rows
-    """(y, prediction, number of classes) -> (n, m) summands"""
+    """Function from labels y, predictions and the number of classes to (n, m) summands"""
     score: Score
-    """(…, m) sums and the number of classes -> (…,) scores"""
+    """Function from (…, m) sums and the number of classes to (…,) scores"""
     vector: bool = False
-    """Truth and predictions are (n, components)."""
+    """True if labels and predictions are vectors, (n, components)"""
     function: Callable[[npt.NDArray[Any], npt.NDArray[Any]], Any] | None = None
-    """(y, prediction) -> score, of a metric of the caller's own, which is no sum over rows"""
+    """Function from labels y and predictions to the score of a caller's own metric, without summands; else None"""
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
-        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow.
+        """Return the score of predictions against labels `y`; infinite if squares of the predictions overflow.
 
-        A caller's own metric is NaN where it raises ValueError; whatever else it raises becomes UsageError.
+        A caller's own metric that raises ValueError or ArithmeticError gives NaN; other errors become UsageError.
         """
         if self.function is not None:
             try:
@@ -50,15 +50,15 @@ class Metric:
                 return float("nan")
             except Exception as error:
                 raise UsageError(
-                    f"The metric {self.name} cannot be computed of {len(y)} rows: {type(error).__name__}: {error}.",
-                    hint="`metric` takes a function of (y, prediction) that returns a number.",
+                    f"The metric {self.name} failed on {len(y)} rows with {type(error).__name__}: {error}.",
+                    hint="`metric` must be a function of (y, prediction) that returns a number.",
                 ) from error
         with np.errstate(over="ignore", invalid="ignore"):
             return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
 
 def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
-    """Return the summands of a mean over rows of `error` of their differences."""
+    """Return the function to the summands of a mean over rows, of `error` applied to prediction minus label."""
     return lambda y, predicted, _: np.column_stack([error(predicted - y), np.ones(len(y))])
 
 
@@ -66,7 +66,7 @@ _squares = _mean_of(np.square)
 
 
 def lengths(vectors: npt.NDArray[Any]) -> FloatArray:
-    """Return the (n,) Euclidean lengths of (n, components)."""
+    """Return the (n,) Euclidean lengths of (n, components) vectors."""
     return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
@@ -82,7 +82,7 @@ def _pairs(y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int) -> 
 
 
 def ratio(sums: FloatArray, _: int = 0) -> FloatArray:
-    """Return (…,) the first of (…, m) sums over the second."""
+    """Return the (…,) quotients of the first and the second of (…, m) sums."""
     return np.asarray(sums[..., 0] / sums[..., 1])
 
 
@@ -96,7 +96,7 @@ def _r2(sums: FloatArray, _: int) -> FloatArray:
 
 
 def confusion(sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return (…, true class, predicted class) from sums of a classification metric."""
+    """Return the (…, true class, predicted class) confusion matrices from the sums of a classification metric."""
     return sums.reshape(*sums.shape[:-1], n_classes, n_classes)
 
 
@@ -106,7 +106,7 @@ def _accuracy(sums: FloatArray, n_classes: int) -> FloatArray:
 
 
 def class_f1(sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return (…, classes) F1 of each class; 0 for a class that is neither there nor predicted, as in scikit-learn."""
+    """Return the (…, classes) F1 scores; 0 for a class that neither occurs nor is predicted, as in scikit-learn."""
     table = confusion(sums, n_classes)
     hit = np.diagonal(table, axis1=-2, axis2=-1)
     return np.asarray(2 * hit / np.maximum(table.sum(axis=-1) + table.sum(axis=-2), 1))
@@ -117,7 +117,7 @@ def _macro_f1(sums: FloatArray, n_classes: int) -> FloatArray:
 
 
 def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return the mean recall over the classes that are there."""
+    """Return the mean recall over the classes that occur among the true labels."""
     table = confusion(sums, n_classes)
     there = table.sum(axis=-1)
     hit = np.diagonal(table, axis1=-2, axis2=-1)
@@ -125,7 +125,7 @@ def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
 
 
 def _of_events(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    """Return the summands of a mean over the rows that are events."""
+    """Return the summands of a mean of predictions over events: the rows whose y is 1."""
     return np.column_stack([y * predicted, y])
 
 
@@ -149,26 +149,26 @@ def _excess(sums: FloatArray, _: int) -> FloatArray:
 
 
 EXCESS = Metric("excess_square", "regression", _squares, _excess)
-"""Mean square beyond the floor of the reference, below zero where chance has it so: errors of force are ranked by it.
-Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
+"""Mean squared error minus the variance of the reference's noise, by which errors of force are ranked; may be negative.
+Its sums are those of a RMSE, then squares and degrees of freedom of the unloaded holds; not a metric for tasks.
 """
 SUMMED = {
     **METRICS,
     EXCESS.name: EXCESS,
     **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
 }
-"""Metrics whose sums replicates keep."""
+"""Metrics by name whose sums are stored for each replicate."""
 
 
 def metric_called(name: str) -> Metric:
-    """Return a metric by name; raises UnknownNameError."""
+    """Return the metric of this name; raise UnknownNameError if there is none."""
     if name not in METRICS:
         raise UnknownNameError("metric", name, METRICS)
     return METRICS[name]
 
 
 def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
-    """Return percentiles of the error over all rows, and each component's own RMSE."""
+    """Return the median and 95th percentile of the error's length over all rows, and the RMSE of each component."""
     error = lengths(predicted - y)
     squares = np.mean((predicted - y) ** 2, axis=0)
     return {

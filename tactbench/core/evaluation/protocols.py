@@ -1,4 +1,4 @@
-"""Protocols as data: how recordings become X and y, and on which data each step is fitted; names of few-shot splits."""
+"""Protocols: how recordings become features X and labels y, and on which data each step of that is fitted."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from tactbench.core.spec.quantity import Frozen
 
 
 class ProtocolSpec(Frozen):
-    """The steps of discarding, scaling and filtering, and the data on which each is fitted."""
+    """A protocol: steps of discarding, scaling and filtering samples, and the data on which each step is fitted."""
 
     name: str
     title: str
     discard_samples: int = Field(default=0, ge=0)
     """Samples dropped at the start of every recording."""
     discard_hold: bool = False
-    """Drop the scene's stated hold (the set-up's initialization, before any load) where a recording has a scene."""
+    """Drop the hold before the press (the set-up's initialization) if the recording's scene states one."""
     tare: bool = False
-    """Subtract from each recording its own mean over the unloaded hold that its scene states; see `sets.hold_s`."""
+    """Subtract from readings the recording's own mean over the unloaded hold of its scene; see `sets.hold_s`."""
     three_sigma: bool = False
-    """Drop a sample if a feature or the reference force lies beyond three standard deviations of its set."""
+    """Drop a sample if a feature or the reference force is over three standard deviations from the mean of its set."""
     scaled_by: Literal["each set", "training set"]
-    """Whose mean and deviation scale a set."""
+    """Data whose mean and deviation scale a set: the set itself or the training set."""
     window_over: Literal["kept samples", "consecutive samples"]
-    """Samples that the mean filter runs over; never across recordings or parts."""
+    """Samples over which the mean filter runs, never across recordings or sets."""
     roles_only: bool = False
-    """Only recordings with the roles train, validation and test can be used."""
+    """True to require recordings with the roles train, validation and test, and split by these roles."""
     uses_test_statistics: bool = False
-    """Rows carry a dagger."""
+    """True if test data are processed by statistics of the test set; such results are marked with a dagger."""
     first_row_only: bool = False
-    """Keep the first row of every recording and nothing else; see `splits`."""
+    """Keep only the first row of every recording; see `splits`."""
     every: int = Field(default=1, ge=1)
-    """Every such sample is looked at, from the first: those of a sensor so many times slower."""
+    """N to keep only each N-th sample from the first, as from a sensor with an N times lower sampling rate."""
     k: int | None = Field(default=None, ge=0)
-    """Samples that the mean filter looks back; None: as many as the estimator states or chooses."""
+    """Number of earlier samples that the mean filter includes; None to use the estimator's own or chosen number."""
     probe: bool = False
-    """It asks for leaks of recordings, not for a sensor's skill, and is allowed for every task, listed or not."""
+    """True if the protocol tests recordings for leaks, not sensors; it may then be used with every task."""
 
 
 KARL2016 = ProtocolSpec(
@@ -52,9 +52,9 @@ KARL2016 = ProtocolSpec(
     roles_only=True,
     uses_test_statistics=True,
 )
-"""The paper's protocol: "the first 600 samples were discarded"; "if any of the force or taxel responses violated a
-three sigma rule, the sample was discarded"; "each of the training, validation and testing set was divided by its
-taxel wise standard deviation after subtracting its taxel wise mean".
+"""Protocol of Karl et al. 2016, section III: "the first 600 samples were discarded"; "if any of the force or taxel
+responses violated a three sigma rule, the sample was discarded"; "each of the training, validation and testing set was
+divided by its taxel wise standard deviation after subtracting its taxel wise mean".
 """
 
 KARL2016_TRAINING_SCALE = KARL2016.model_copy(
@@ -64,8 +64,8 @@ KARL2016_TRAINING_SCALE = KARL2016.model_copy(
         "scaled_by": "training set",
     }
 )
-"""The paper's protocol in everything but one: beside it, it shows the worth of scaling each set by itself. The
-three-sigma rule still drops test rows by the test set's own statistics."""
+"""As `karl2016`, but with every set scaled by the training set, to show the effect of scaling each set by itself.
+The three-sigma rule still drops test rows by the test set's own statistics."""
 
 DEPLOYABLE = ProtocolSpec(
     name="deployable",
@@ -75,7 +75,7 @@ DEPLOYABLE = ProtocolSpec(
     scaled_by="training set",
     window_over="consecutive samples",
 )
-"""As a sensor in use: tared before a press, no statistic of the test set, causal windows, no row dropped by label."""
+"""As in use: tare before each press, causal filters, no statistics of the test set, no row dropped by its label."""
 
 DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
     update={
@@ -84,7 +84,7 @@ DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
         "tare": False,
     }
 )
-"""The same without the tare: beside it, it shows the worth of taring."""
+"""As `deployable`, but without the tare, to show the effect of taring."""
 
 FIRST_FRAME = ProtocolSpec(
     name="first-frame",
@@ -94,7 +94,7 @@ FIRST_FRAME = ProtocolSpec(
     first_row_only=True,
     probe=True,
 )
-"""The answer from the reading before anything happened. The hold is not dropped, since the first row lies in it."""
+"""Answers from a recording's first reading, before any contact. The hold, which includes this reading, is kept."""
 
 PROTOCOLS = {
     protocol.name: protocol
@@ -103,24 +103,24 @@ PROTOCOLS = {
 
 
 def is_probe(name: str) -> bool:
-    """Return whether a protocol is a probe for leaks; an unknown name is none."""
+    """Return True if the protocol of this name is a probe for leaks, False also for an unknown name."""
     return name in PROTOCOLS and PROTOCOLS[name].probe
 
 
 def without_options(name: str) -> str:
-    """Return the name of a protocol without its options (``@…``)."""
+    """Return the name of a protocol without its options, such as ``deployable`` for ``deployable@k=3``."""
     return name.partition("@")[0]
 
 
 def protocol_called(name: str) -> ProtocolSpec:
-    """Return a protocol by name, which may end in options: ``deployable@every=4,k=3``.
+    """Return the protocol of a name, which may end in options: ``deployable@every=4,k=3``.
 
     Raises
     ------
     UnknownNameError
-        If there is none of this name.
+        If there is no protocol of this name.
     UsageError
-        If an option is none of ``every=N`` (from 1) and ``k=N`` (from 0).
+        If an option is neither ``every=N`` (N from 1) nor ``k=N`` (N from 0).
     """
     plain = without_options(name)
     if plain not in PROTOCOLS:
@@ -130,7 +130,7 @@ def protocol_called(name: str) -> ProtocolSpec:
     found = re.fullmatch(r"(?:every=([1-9][0-9]{0,5}))?(?:(?:^|(?<=.),)k=([0-9]{1,6}))?", name[len(plain) + 1 :])
     if found is None or not any(found.groups()):
         raise UsageError(
-            f"Protocol {name!r}: {name[len(plain) + 1 :]!r} is no option of a protocol.",
+            f"Protocol {name!r}: {name[len(plain) + 1 :]!r} is not an option of a protocol.",
             hint=f"Write {plain}@every=4 for every 4th sample, {plain}@k=3 for a mean over 4, {plain}@every=4,k=3.",
         )
     given = {key: int(text) for key, text in zip(("every", "k"), found.groups(), strict=True) if text}
@@ -138,6 +138,6 @@ def protocol_called(name: str) -> ProtocolSpec:
 
 
 def shots(split: str) -> int | None:
-    """Return how many training sessions a split named `few-shot-N` has; None if it is another."""
+    """Return N, the number of training sessions, for a split named ``few-shot-N``; None for another split."""
     found = re.fullmatch(r"few-shot-([1-9][0-9]*)", split)
     return int(found[1]) if found else None

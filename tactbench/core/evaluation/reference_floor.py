@@ -1,8 +1,8 @@
-"""The floor of the reference, the error beyond it, and on a simulated rig the error against the true force.
+"""Noise floor of the reference sensor, errors beyond that floor, and the true force of a simulated rig.
 
-A reference that errs by noise of deviation f puts f under every RMSE against it: of an estimator that errs by e on its
-own, the mean squares add up to ``e² + f²``. The floor is measured where the true force is known not to change: in the
-recording's unloaded hold.
+The noise of the reference, of standard deviation f, adds to every RMSE against it: for an estimator with an own error
+of e, the RMSE is ``sqrt(e² + f²)``. The floor f is measured in the recording's unloaded hold, where the true force
+does not change.
 """
 
 from __future__ import annotations
@@ -21,38 +21,38 @@ from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
 FEWEST = 30
-"""Independent unloaded samples that a floor needs (assumed): a deviation from 30 is known to 13 %."""
+"""Least number of independent unloaded samples for a floor (assumed): 30 give a standard deviation to 13 %."""
 
 
 @dataclass(frozen=True)
 class Floor:
-    """Unloaded readings of the reference of the tested recordings."""
+    """Noise floor of the reference, from its unloaded readings in the test recordings."""
 
     holds: dict[int, FloatArray]
-    """By number of the recording (:func:`hold_of`)."""
+    """(n, 2) squares and degrees of freedom (:func:`hold_of`) by index of the recording."""
 
     @property
     def value(self) -> float:
-        """The deviation of the reference, pooled over the recordings."""
+        """Standard deviation of the unloaded reference, pooled over recordings, in the target's unit."""
         return float(np.sqrt(self.square))
 
     @property
     def square(self) -> float:
-        """The variance of the reference, pooled over the recordings."""
+        """Variance of the unloaded reference, pooled over recordings."""
         return float(ratio(sum(one.sum(axis=0) for one in self.holds.values())))
 
     @property
     def standard_error(self) -> float:
-        """That of :attr:`value`: of a mean of squares, correlated as they are, by the derivative of the root."""
+        """Standard error of :attr:`value`, from that of a mean of correlated squares by the derivative of the root."""
         squares = [one[:, 0] - one[:, 0].mean() for one in self.holds.values()]
         variance = sum(integrated_correlation(one) * (one @ one) for one in squares)
         return float(np.sqrt(variance) / sum(map(len, squares)) / (2.0 * self.value)) if variance else 0.0
 
     def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
-        """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
+        """Return (replicates, 2) sums of squares and degrees of freedom; `code` is the (n,) replicate of each test row.
 
-        Where a recording's test rows are in several replicates, its hold is dealt to them in order of time, in
-        proportion to their rows: noise of one hold is as good as of another.
+        If a recording's test rows are in several replicates, the samples of its hold are divided among these in order
+        of time and in proportion to the numbers of their rows.
         """
         out = np.zeros((int(code.max()) + 1, 2))
         for place, hold in self.holds.items():
@@ -63,14 +63,14 @@ class Floor:
 
 
 def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answers) -> tuple[Floor | None, str]:
-    """Return the floor from the unloaded holds of the tested recordings, or None and the reason.
+    """Return the noise floor from the unloaded holds of the test recordings, or None and the reason.
 
     Notes
     -----
-    Sums of squares about each hold's own mean and their degrees of freedom are pooled, so that offsets between
-    recordings are no noise and the variance is unbiased. The mean of n samples whose correlations add up to tau
-    (1 for white noise) takes ``tau`` degrees of freedom, not one: ``E sum (y - mean)² = n sigma² - n var(mean) =
-    (n - tau) sigma²``, so that a reference behind a low-pass is measured right too.
+    Sums of squares about each hold's own mean, and their degrees of freedom, are pooled, so that offsets between
+    recordings do not count as noise and the variance is unbiased. The mean of n samples whose correlations sum to tau
+    (1 for white noise) uses ``tau`` degrees of freedom, not one: ``E sum (y - mean)² = n sigma² - n var(mean) =
+    (n - tau) sigma²``, so that the floor of a low-pass filtered reference is correct too.
     """
     target = task.target
     if metric.name != "rmse" or not isinstance(target, ChannelTarget) or target.kind != "force" or target.reduce:
@@ -98,10 +98,10 @@ def _no_hold(table: Table) -> str:
 
 
 def hold_of(y: npt.NDArray[Any]) -> FloatArray:
-    """Return squares and degrees of freedom of (n,) samples of an unloaded reference in time order, n at least 2.
+    """Return (n, 2) squares and degrees of freedom of n >= 2 samples of the unloaded reference, in order of time.
 
-    (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
-    less one, or less than that where noise is correlated.
+    Columns: a sample's squared difference from the mean, and its part of the degrees of freedom. All parts sum to
+    n - 1 for white noise, and to less for correlated noise.
     """
     centred = y - np.mean(y)
     n = len(centred)
@@ -110,13 +110,13 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
 
 
 def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> tuple[float, Interval]:
-    """Return the part of a RMSE beyond the floor, with its 95 % interval, without ends for too few units.
+    """Return the part of a RMSE beyond the noise floor, and its 95 % interval (without ends for too few units).
 
     Notes
     -----
-    The interval is of the mean square beyond the floor, ``mean (p - y)² - floor²``, which may be below zero and is a
-    sum of two independent means; only its ends are put through ``sqrt(max(0, .))``. Each unit is left out in turn, its
-    hold with it.
+    The interval is computed for ``mean (p - y)² - floor²``, which may be below zero and is a sum of two independent
+    means; its ends are then transformed by ``sqrt(max(0, .))``. Each unit is left out in turn (jackknife), with its
+    part of the holds.
     """
     loss = (tested.y_pred - tested.y_true) ** 2
     excess = float(loss.mean() - floor.square)
@@ -135,10 +135,10 @@ def _root(excess: float) -> float:
 
 
 def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | None:
-    """Return (n,) the force [N] that was exerted at each test row; None where it is unknown.
+    """Return the (n,) forces [N] that the rig exerted at the test rows; None if they are unknown.
 
-    A simulated rig without a force loop follows its scene's profile exactly; there the profile is the truth, noise and
-    filters of the reference are not in it. A real rig's truth is not known, nor that of a simulated loop, which is not
+    A simulated rig without a force loop follows its scene's profile exactly, so the profile is the true force, without
+    noise and filters of the reference. The true force of a real rig, or of a simulated one with a force loop, is not
     recorded.
     """
     target = task.target
@@ -156,11 +156,11 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
 
 
 def integrated_correlation(centred: FloatArray) -> float:
-    """Return the sum of all correlations of (n,) numbers about their mean, at least that of white noise: 1.
+    """Return the sum of the autocorrelations of (n,) centred numbers over all lags; at least 1, as for white noise.
 
-    The mean of n of them varies by so many times ``variance / n``. By the flat-top lag window, whose bandwidth is twice
-    the last lag with a significant correlation (Politis and White 2004, Automatic block-length selection for the
-    dependent bootstrap).
+    It is the factor by which the variance of their mean exceeds ``variance / n``, estimated by the flat-top lag window,
+    whose bandwidth is twice the last lag with a significant correlation (Politis and White 2004, Automatic block-length
+    selection for the dependent bootstrap).
     """
     n = len(centred)
     if n < 8 or not (np.abs(centred) > 0).any():

@@ -1,20 +1,20 @@
-"""The replicates of a row: sums by which scores can be compared later without the answers.
+"""Sums over each replicate (such as a session) that a result keeps, to compare scores later without the answers.
 
 ::
 
     {"unit": "session",                  word for a replicate
-     "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
-     "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
-     "sums": [[…], …]                    the metric's summands over each replicate
-     "own": [0.61, …]                    the score of each by itself; None where the metric of it is undefined
-     "floor": [[…, …], …],               of a RMSE whose reference has a floor: squares and degrees of freedom of its
-                                         unloaded holds over each replicate
-     "scores": [0.63, …],                in place of sums, of a metric of the caller's own: the jackknife's
-                                         pseudo-values, whose mean is the score and whose spread its error
-     "true": {"sums": …, "own": …}       of an error of force: both against the force that a simulated rig exerted
+     "names": ["s1", "s2", …],           sorted names of replicates: two rows with the same names can be paired
+     "strata": [0, 0, 1, …] or None,     stratum of each replicate, for the jackknife; None: all in one stratum
+     "sums": [[…], …]                    sums of the metric's summands over each replicate
+     "own": [0.61, …]                    score of each replicate by itself; None where the metric is undefined
+     "floor": [[…, …], …],               for a RMSE with a noise floor: sums of squares and degrees of freedom of the
+                                         reference's unloaded holds, for each replicate
+     "scores": [0.63, …],                for a caller's own metric, in place of sums: the jackknife's pseudo-values,
+                                         whose mean estimates the score and whose spread its standard error
+     "true": {"sums": …, "own": …}       for an error of force: both against the force that a simulated rig exerted
 
-A classification's summands are a table of true and given classes, mostly empty: a line of sums then is ``column, count,
-column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of all lines is the row's score.
+The summands of a classification are a flat table of true and given classes, mostly zero, so that a line of sums is
+``column, count, column, count …``. :attr:`Metric.score` of the sum of all lines is exactly the row's score.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tactbench.core.samples import Answers, FloatArray
 
 
 def replicates(data: Dataset, name: str | None, tested: Answers) -> ReplicateUnits:
-    """Return which unit of replication of that name every test row belongs to; None: all rows are one."""
+    """Return the replicate of each test row, by the group labels called `name`; None: all rows are one replicate."""
     if name is None:
         return ReplicateUnits("", np.zeros(len(tested), dtype=np.int64), ("",))
     values = at_rows(data, data.column(lambda table: table.groups[name]), tested)
@@ -49,7 +49,7 @@ def summed(
     floor: Floor | None = None,
     truth: FloatArray | None = None,
 ) -> dict[str, Any]:
-    """Return the replicates of a row; `truth` is the force that was exerted, (n,), where it is known."""
+    """Return the sums described above, for the replicates in `unit`; `truth` is the (n,) true force [N], if known."""
     strata = unit.strata(tested.y_true, n_classes)
     kept = {"unit": unit.name, "names": list(unit.labels), "strata": strata.tolist() if strata.any() else None}
     if metric.function is not None:
@@ -80,9 +80,9 @@ def _plain(scores: FloatArray) -> list[float | None]:
 
 
 def tables_of(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
-    """Return (rows, replicates, m) the sums that :func:`summed` wrote, of rows with equal names.
+    """Return the (rows, replicates, m) sums that :func:`summed` wrote, for rows with the same names of replicates.
 
-    With `metric` :data:`EXCESS`, squares and degrees of freedom of the unloaded holds stand behind those of the errors.
+    With the name of :data:`EXCESS`, squares and degrees of freedom of the unloaded holds follow those of the errors.
     """
     if not n_classes:
         dense = np.array([one["sums"] for one in several], dtype=np.float64)

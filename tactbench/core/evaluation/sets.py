@@ -1,4 +1,4 @@
-"""From masks to X and y: rows are tared, discarded, scaled and filtered as the protocol has it."""
+"""Make features X and labels y of training, validation and test sets: tare, discard, scale and filter by protocol."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from tactbench.core.spec.task import TaskSpec
 
 
 def hold_s(meta: RecordingMeta) -> float:
-    """Return how many seconds a recording is commanded to be unloaded before its press; 0 where it states none.
+    """Return the duration [s] of a recording's unloaded hold before the press; 0 if no such hold is stated.
 
-    A scene states it (:class:`ForceRamp.hold`). Recordings without a scene, a clock or a hold at zero force state none,
-    and none is inferred from their readings.
+    The recording's scene states the hold (:class:`ForceRamp.hold`). It is 0 for a recording without a scene, a clock
+    or a hold at zero force, and is never inferred from readings.
     """
     if meta.scene is None or meta.clock == "none" or meta.scene.profile.corners[1][0] != 0:
         return 0.0
@@ -31,57 +31,57 @@ def hold_s(meta: RecordingMeta) -> float:
 
 
 def unloaded(table: Table) -> npt.NDArray[np.bool_]:
-    """Return (n,) which rows of a recording lie in its unloaded hold."""
+    """Return an (n,) mask, True for rows in the recording's unloaded hold before the press."""
     return np.asarray(table.time_s < hold_s(table.meta))
 
 
 def tared(table: Table) -> FloatArray:
-    """Return (n, features) readings less their mean over the recording's own unloaded hold.
+    """Return (n, features) readings minus their mean over the recording's own unloaded hold.
 
-    Rows after the hold change nothing; a recording without a row there is returned as it is.
+    Rows after the hold have no influence on the mean; readings without a row in the hold are returned unchanged.
     """
     return less_rest(table.X, unloaded(table))
 
 
 def less_rest(X: FloatArray, before: Mask) -> FloatArray:
-    """Return (n, channels) readings less the mean of those that are (n,) before the press, if there are any."""
+    """Return (n, channels) readings minus their mean over the rows in the (n,) mask `before`, unless it is empty."""
     return X - X[before].mean(axis=0) if before.any() else X
 
 
 def tare_s(data: Dataset) -> float:
-    """Return how many seconds every recording can be tared on, the shortest hold of all; 0 if none states one.
+    """Return the shortest unloaded hold [s] of all recordings; 0 if no recording states such a hold.
 
-    Recordings of which some only can be tared are refused: their readings would not be of one kind.
+    Raises NotApplicable if only some recordings can be tared: tared and untared readings must not be mixed.
     """
     held = [hold_s(table.meta) if unloaded(table).any() else 0.0 for table in data.tables]
     if any(held) and not all(held):
         name = data.metas[held.index(0.0)].name
         raise NotApplicable(
             f"{sum(one > 0 for one in held)} of {len(held)} recordings state an unloaded hold to tare on; {name!r} "
-            "states none.",
-            hint="Use protocol `deployable-untared`, which tares none of them.",
+            "states no such hold.",
+            hint="Use protocol `deployable-untared`, which does not tare.",
         )
     return min(held, default=0.0)
 
 
 @dataclass(frozen=True)
 class FeatureScale:
-    """Mean and deviation of each feature."""
+    """Mean and standard deviation of each feature, by which readings are scaled."""
 
     mean: FloatArray
     deviation: FloatArray
 
     def __call__(self, X: FloatArray) -> FloatArray:
-        """Return z-scores; a feature that was constant where the scale was measured becomes exactly 0, never NaN."""
+        """Return the z-scores of readings; exactly 0 for a feature whose deviation is 0, never NaN."""
         useful = self.deviation > 0
         return np.where(useful, (X - self.mean) / np.where(useful, self.deviation, 1.0), 0.0)
 
 
 def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviation of (n,) or of each column of (…, columns) in two passes, 0 of a constant one.
+    """Return mean and standard deviation of (n,) numbers, or of each column of (…, columns), in two passes.
 
-    A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
-    it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
+    The deviation of a constant column is exactly 0. It is decided by comparing minimum and maximum, because the
+    computed deviation is the rounding error of the mean, which division would turn into a signal.
     """
     rows = tuple(range(max(X.ndim - 1, 1)))
     mean = X.mean(axis=rows)
@@ -95,13 +95,13 @@ class SetRows(Part):
 
     labelled: Mask
     segment: IntArray
-    """Windows stay within one number."""
+    """(n,) index of the run of rows to which each row belongs; mean filters never run across two runs."""
 
 
 def keep(data: Dataset, protocol: ProtocolSpec, rows: Mask, what: str, counts: Counter[str]) -> SetRows:
-    """Return those of the rows of a set, a mask over all rows, that the protocol keeps.
+    """Return the rows of a set that the protocol keeps; `rows` is the set's mask over all rows of `data`.
 
-    `counts` gets the number of rows that the three-sigma rule drops; `what` names the set in messages.
+    Rows dropped by the three-sigma rule are counted in `counts`; `what` is the set's name in messages.
     """
     chosen = rows & data.column(lambda table: asked_for(table, protocol))
     if not chosen.any():
@@ -114,8 +114,8 @@ def keep(data: Dataset, protocol: ProtocolSpec, rows: Mask, what: str, counts: C
         good = _within_three_sigma(X, force, data.features, what, counts)
         if not good.any():
             raise DataError(
-                f"The three-sigma rule of {protocol.name!r} leaves none of the {len(X)} rows of the {what} set.",
-                hint="Look at its channels with `tactbench inspect`, or use protocol `deployable`.",
+                f"The three-sigma rule of {protocol.name!r} drops all {len(X)} rows of the {what} set.",
+                hint="Inspect the channels with `tactbench inspect`, or use protocol `deployable`.",
             )
     if protocol.window_over == "consecutive samples":
         # `place` does not count rows with a dropped-out channel: a filter in use skips such a row and goes on. A jump
@@ -131,21 +131,21 @@ def keep(data: Dataset, protocol: ProtocolSpec, rows: Mask, what: str, counts: C
 
 
 def asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
-    """Return (n,) which rows the protocol looks at, by their place in the recording."""
+    """Return an (n,) mask of the rows that the protocol keeps by their position in the recording."""
     if protocol.first_row_only:
         return np.asarray(np.arange(len(table.row)) == 0)
     return np.asarray((table.row >= protocol.discard_samples) & (table.time_s >= dropped_s(table.meta, protocol)))
 
 
 def dropped_s(meta: RecordingMeta, protocol: ProtocolSpec) -> float:
-    """Return how many seconds the protocol drops at the start of a recording: the hold that its scene states."""
+    """Return the time [s] that the protocol drops at the start of a recording: the hold of the scene, or 0."""
     return meta.scene.profile.hold_s if protocol.discard_hold and meta.scene is not None else 0.0
 
 
 def _within_three_sigma(
     X: FloatArray, force: FloatArray, features: Sequence[str], what: str, counts: Counter[str]
 ) -> Mask:
-    """Return which rows have every channel within three standard deviations of that channel's mean in this set."""
+    """Return an (n,) mask, True for rows with all channels within three standard deviations of the channel's mean."""
     good = np.ones(len(X), dtype=bool)
     for name, column in (*zip(features, X.T, strict=True), ("force", force)):
         there = ~np.isnan(column)
@@ -160,32 +160,32 @@ def _within_three_sigma(
 
 
 def part(kept: SetRows, scale: FeatureScale, k: int) -> Part:
-    """Scale and filter a set, and leave the rows that have a label."""
+    """Scale a set, filter it by a mean over `k` + 1 rows, and return its labelled rows."""
     return taken(replace(kept, X=causal_mean(scale(kept.X), k, kept.segment)), kept.labelled)
 
 
 def taken(of: Part, rows: Mask | IntArray) -> Part:
-    """Return some rows of a set."""
+    """Return the rows of a set that a mask or an array of indices selects."""
     return Part(**{column.name: getattr(of, column.name)[rows] for column in fields(Part)})
 
 
 def scale_of(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> FeatureScale:
-    """Return the scale of a set beside its training set, as the protocol has it."""
+    """Return the scale for a set: that of the training set, or the set's own if the protocol scales by each set."""
     return FeatureScale(*moments((other if protocol.scaled_by == "each set" else train).X))
 
 
 def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, step: int) -> Dataset:
-    """Return windows of each recording as rows to be answered, `X` (n, window, channels) in order of time.
+    """Return a data set with one row for each window of a recording, `X` (n, window, channels) in order of time.
 
-    A window has `window` consecutive rows that the protocol keeps, tared as it has it, and is labelled as its last row
-    is; the next one ends `step` rows later. Raises NotApplicable where rows are no consecutive samples.
+    A window has `window` consecutive rows that the protocol keeps, tared if it tares, and the label of its last row.
+    The next window ends `step` rows later. Raises NotApplicable if rows are not consecutive samples.
     """
     own = task.answer_per == "frame" or task.summaries or task.features_by
     if own or rules.three_sigma or rules.first_row_only or rules.k is not None:
         raise NotApplicable(
-            f"window={window} needs runs of samples as they are, which "
-            f"{f'task {task.name!r}' if own else f'protocol {rules.name!r}'} does not answer.",
-            hint="Use protocol `deployable` and a task of samples, or leave `window` out.",
+            f"window={window} needs consecutive single samples, which "
+            f"{f'task {task.name!r}' if own else f'protocol {rules.name!r}'} does not use.",
+            hint="Use protocol `deployable` and a task on single samples, or leave `window` out.",
         )
 
     def of(table: Table) -> Table:
@@ -201,7 +201,7 @@ def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, st
 
 
 def apart(fold: Assignment, data: Dataset, window: int, step: int) -> Assignment:
-    """Return a fold without the training windows that have a row in common with a test window."""
+    """Return a fold without those training windows that share a row with a test window."""
     reach = (window - 1) // step
     near = [np.convolve(test, np.ones(2 * reach + 1))[reach : reach + len(test)] if len(test) else test
             for test in data.parted(fold.test)]  # fmt: skip
@@ -209,9 +209,9 @@ def apart(fold: Assignment, data: Dataset, window: int, step: int) -> Assignment
 
 
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
-    """Return X and y of one fold: kept, scaled and filtered over `k` + 1 samples as the protocol has it.
+    """Return the sets of one fold, discarded and scaled by the protocol, and filtered by a mean over `k` + 1 samples.
 
-    `counts` gets the rows left out, and the features that never change.
+    Rows left out, and features that are constant in training, are counted in `counts`.
     """
     train = keep(data, rules, assignment.train, "training", counts)
     for name, width in zip(data.features, np.ptp(train.X, axis=tuple(range(train.X.ndim - 1))), strict=True):
@@ -228,10 +228,10 @@ def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int,
 
 
 def causal_mean(X: FloatArray, k: int, segment: npt.NDArray[np.integer]) -> FloatArray:
-    """Return the mean of each row and the up to `k` rows before it in its segment: (n,) non-decreasing numbers.
+    """Return the (n, features) mean of each row with up to `k` rows before it in the same segment.
 
-    By cumulative sums of the centred columns: without centring, an offset of 1e8 would leave 1e-8 of its own size as
-    error in every difference of sums.
+    `segment` has (n,) non-decreasing numbers. Sums are cumulative over centred columns: without centring, an offset of
+    1e8 would leave an error of 1e-8 of its size in every difference of sums.
     """
     if k == 0 or len(X) == 0:
         return X

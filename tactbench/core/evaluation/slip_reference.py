@@ -1,4 +1,4 @@
-"""Slip of a recording by its reference."""
+"""Slip of a recording as measured by its reference sensors of force and position."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.task import ChannelTarget
 
 SCALES = (1.0, 0.5, 2.0)
-"""Of the label thresholds: as stated, halved and doubled."""
+"""Factors on the thresholds of slip labels: as stated, halved and doubled."""
 _CHANNELS = (
     ChannelTarget(kind="force", name="normal", unit="N"),
     ChannelTarget(kind="force", name="tangential", unit="N"),
@@ -29,25 +29,25 @@ _CHANNELS = (
 
 @dataclass(frozen=True)
 class SlipReference:
-    """The reference's samples, and their labels."""
+    """Samples of the slip reference of one recording, and their slip labels."""
 
     t_ns: IntArray
-    """(n,) nanoseconds since the first row of the sensor's clock"""
+    """(n,) times [ns] since the first row of the sensor's clock"""
     displacement_m: FloatArray
-    """(n,) of surface and skin against each other"""
+    """(n,) displacement [m] of the surface relative to the sensor's skin"""
     force_share: FloatArray
-    """(n,) tangential force over friction times normal force; 0 without contact"""
+    """(n,) ratio of tangential force to friction coefficient times normal force; 0 without contact"""
     normal_n: FloatArray
-    """(n,)"""
+    """(n,) normal force [N]"""
     labels: Mapping[float, SlipLabels]
-    """By scale of the thresholds; one under which nothing rests is not there"""
+    """Slip labels by factor on the thresholds, without factors for which the surface is never at rest"""
     disturbance: bool
-    """Whether the recording as a whole is a disturbance that is no slip"""
+    """True if the whole recording is a disturbance without slip"""
 
     def at(self, ends_ns: IntArray, values: npt.NDArray[Any], missing: float = np.nan) -> npt.NDArray[Any]:
-        """Return (k,) the value of the last sample at or before each time, from (n,) values of samples.
+        """Return (k,) values of the last sample at or before each of (k,) times [ns], from (n,) `values` of samples.
 
-        It is `missing` before the first sample and after the last one's interval.
+        The value is `missing` before the first sample, and later than one interval after the last sample.
         """
         place = np.searchsorted(self.t_ns, ends_ns, side="right") - 1
         step = int(np.median(np.diff(self.t_ns))) if self.t_ns.size > 1 else 0
@@ -55,15 +55,15 @@ class SlipReference:
         return np.where(there, values[np.maximum(place, 0)], missing)
 
     def state(self, ends_ns: IntArray, scale: float = 1.0) -> IntArray:
-        """Return (k,) states at some times; undecided where the reference has no sample."""
+        """Return the (k,) slip states at (k,) times [ns]; ``UNDECIDED`` where the reference has no sample."""
         return self.at(ends_ns, self.labels[scale].state, UNDECIDED)
 
 
 def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
-    """Read and label the reference of a recording, times counted from `first_ns`.
+    """Read the slip reference of a recording and label its samples; times are counted from `first_ns`.
 
-    `counts` gets the number of samples left out. Raises NotApplicable if a channel or the coefficient of
-    friction is missing, DataError if the coefficient is no number or the surface never rests.
+    Samples left out are counted in `counts`. Raises NotApplicable if a channel or the coefficient of friction is
+    missing, DataError if the coefficient is not a positive number or the surface is never at rest.
     """
     name = recording.meta.name
     found = {str(one.name): channels_for(recording, one) for one in _CHANNELS}
@@ -72,14 +72,14 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
         missing.append(f"label {target.friction}")
     if missing:
         raise NotApplicable(
-            f"Slip is labelled by the reference's normal, tangential and slip and by the label {target.friction}; "
+            f"Slip labels need the reference channels normal, tangential and slip, and the label {target.friction}; "
             f"recording {name!r} has no {', '.join(missing)}.",
-            hint="State them in the mapping, or choose another task.",
+            hint="State what is missing in the mapping, or choose another task.",
         )
     clock = recording.read(found["slip"][0][0])
     require_forward(clock, name)
     if clock.t_ns is None:
-        raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="State it in the mapping.")
+        raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="State a clock in the mapping.")
     columns = np.array([channel_on(recording, one, clock) for one in _CHANNELS])
     whole = ~np.isnan(columns).any(axis=0)
     if not whole.all():
@@ -92,8 +92,8 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
         friction = np.nan
     if not 0 < friction < np.inf:
         raise DataError(
-            f"The label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
-            hint="Give a number above 0.",
+            f"Label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
+            hint="State the coefficient of friction, a number above 0.",
         )
     labels = {}
     for scale in SCALES:

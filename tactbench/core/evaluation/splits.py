@@ -1,4 +1,4 @@
-"""Splits: which rows train, validate and test, and the groups that these do not share."""
+"""Splits: divide rows into training, validation and test sets, such that these share no group (session, object …)."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from tactbench.core.spec.task import TaskSpec
 
 Places = npt.NDArray[np.int64]
 FOLDS = 5
-"""Folds of grouped and of shuffled splits."""
+"""Number of folds of grouped and shuffled splits."""
 TRAIN_SHARE = 0.8
-"""First part, in time, that an in-session split trains on."""
+"""Share of a recording's labelled rows, from its start, on which an in-session split trains."""
 SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
-"""Splits whose unit of replication is the session; few-shot-N is another."""
+"""Splits whose unit of replication is the session, as it also is for few-shot-N."""
 ONE_BY_ONE = ("unit", "placement", "cap_radius_mm")
-"""Groups that are left out one by one whatever the task, beside those of the task's own campaigns."""
+"""Kinds of groups of which each is a fold of its own for any task; a task's campaigns may add other kinds."""
 MOST_ONE_BY_ONE = 12
-"""Up to so many groups are left out one by one; more are dealt into folds."""
+"""Largest number of groups that are each a fold of their own; more groups are divided into `FOLDS` folds."""
 SHUFFLED_STAMP = f"{LEAKS}split shuffled puts neighbouring rows of one recording or object on both sides."
 SHUFFLED_WHOLE_STAMP = f"{LEAKS}split shuffled deals recordings at random, of one object or session on both sides."
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """The rows that train, test and validate: masks over the rows of all recordings, one after the other."""
+    """One fold: masks of its training, test and validation rows over the rows of all recordings in order."""
 
     name: str
     train: Mask
     test: Mask
     validation: Mask | None = None
     groups: str = "session"
-    """Name of the groups that training and test do not share; also those of an inner split."""
+    """Name of the group labels that training and test rows do not share; an inner split keeps them apart too."""
 
 
 class OwnSplit:
-    """Folds that a caller gives: by an object with scikit-learn's ``split(X, y, groups)``, or as index arrays.
+    """Folds given by a caller: an object with scikit-learn's ``split(X, y, groups)``, or pairs of index arrays.
 
-    They are made once, so that all that is scored by them has the same, whatever the object draws.
+    The folds are made once and reused, so that all estimators are scored on the same folds even by a random object.
     """
 
     def __init__(self, split: Any, groups: str | npt.ArrayLike | None) -> None:
@@ -59,13 +59,13 @@ class OwnSplit:
 
     @property
     def name(self) -> str:
-        """The name in rows and tables."""
+        """Name of the split in results and tables."""
         if isinstance(self._splitter, list):
             return f"{len(self._splitter)} given folds"
         return " ".join(repr(self._splitter).partition(" object at 0x")[0].split())
 
     def folds(self, X: FloatArray, y: npt.NDArray[Any], groups: npt.NDArray[Any] | None) -> list[tuple[Places, Places]]:
-        """Return the rows of X that train and those that test, fold by fold; UsageError if they are none."""
+        """Return (training, test) indices of rows of X for each fold; raise UsageError if there are none."""
         if not self._folds:
             given: Any = self._splitter
             try:
@@ -74,29 +74,29 @@ class OwnSplit:
                     pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
                 if not self._folds:
-                    raise ValueError("there is none.")
+                    raise ValueError("no fold was given.")
             except (TypeError, ValueError, IndexError) as error:
                 raise UsageError(
                     f"split={self.name} makes no folds of {len(y)} rows: {error}",
                     hint="`split` takes a name, an object with scikit-learn's `split(X, y, groups)`, or pairs of index "
-                    "arrays (train, test) over the rows of X; what a splitter keeps apart is given as `groups`.",
+                    "arrays (train, test) over the rows of X; `groups` takes the groups for such an object.",
                 ) from error
         return self._folds
 
 
 def _places(given: Any, n: int) -> Places:
-    """Return the places of rows, given as such or as a mask; ValueError or IndexError for anything else."""
+    """Return row indices given as indices or as a mask over n rows; raise ValueError or IndexError for other values."""
     found: Places = np.arange(n)[np.asarray(given)]
     if len(np.unique(found)) < found.size:
-        raise ValueError("a row stands twice in one index array.")
+        raise ValueError("an index array contains a row twice.")
     return found
 
 
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
-    """Return the split to use: the one that was requested, or the task's first that the recordings can serve.
+    """Return the name of the split to use: the requested split, or the task's first split that is possible.
 
-    Raises UsageError if the requested one cannot be served, NotApplicable if it does not go with the protocol or none
-    of the task's can be served.
+    Raises UsageError if the recordings cannot be split as requested, NotApplicable if the protocol does not allow the
+    requested split or no split of the task is possible.
     """
     split = _split_for(task, protocol, data, requested)
     if protocol.first_row_only:
@@ -108,7 +108,7 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
     if protocol.roles_only:
         if requested not in (None, "roles"):
             raise NotApplicable(
-                f"Protocol {protocol.name!r} splits by roles only; {requested!r} was asked for.",
+                f"Protocol {protocol.name!r} splits by roles only, not by {requested!r}.",
                 hint="Use protocol `deployable` for other splits.",
             )
         if not {"train", "validation", "test"} <= {meta.role for meta in data.metas}:
@@ -120,7 +120,7 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
         return "roles"
     if requested == "in-session" and data.whole:
         raise NotApplicable(
-            f"Split 'in-session' cuts recordings in time; task {task.name!r} asks one answer of each as a whole.",
+            f"Split 'in-session' cuts recordings in time, but task {task.name!r} needs whole recordings.",
             hint="Use a split that keeps recordings whole, such as `recording`.",
         )
     if requested is not None:
@@ -129,21 +129,21 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
             names |= {name for name in task.splits if shots(name)}
             able = sorted(name for name in names if _can(name, data))
             raise UsageError(
-                f"These recordings cannot be split by {requested!r}.", hint=f"They can by: {', '.join(able)}."
+                f"These recordings cannot be split by {requested!r}.", hint=f"Choose one of: {', '.join(able)}."
             )
         return requested
     for name in sorted(task.splits, key=lambda name: name == "shuffled"):  # a leak is better than no answer only
         if _can(name, data):
             return name
     raise NotApplicable(
-        f"None of the splits of task {task.name!r} ({', '.join(task.splits)}) fits these recordings.",
-        hint="Name sessions, roles or groups in the mapping.",
+        f"None of the splits of task {task.name!r} ({', '.join(task.splits)}) is possible with these recordings.",
+        hint="State sessions, roles or group labels in the mapping, or choose another split.",
     )
 
 
 def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
-    """Raise NotApplicable for recordings whose first row stands for nothing that comes later."""
-    asks = f"Protocol {FIRST_FRAME.name!r} asks whether the first row of a recording gives its answer away; "
+    """Raise NotApplicable if a protocol on the first rows of recordings cannot test them for leaks."""
+    asks = f"Protocol {FIRST_FRAME.name!r} tests if the answer can be predicted from a recording's first row alone; "
     why, hint = "", "Compare with split `shuffled` instead."
     changing = next((one for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
     if changing is not None:
@@ -174,13 +174,13 @@ def _can(name: str, data: Dataset) -> bool:
 
 
 def used_rows(assignments: Sequence[Assignment]) -> Mask:
-    """Return the rows that some fold trains, validates or tests on, as a mask."""
+    """Return a mask of the rows that are in the training, validation or test set of at least one fold."""
     sets = [mask for one in assignments for mask in (one.train, one.test, one.validation) if mask is not None]
     return np.asarray(np.logical_or.reduce(sets))
 
 
 def without_part(data: Dataset, split: str, used: Mask) -> dict[str, int]:
-    """Return how many recordings no fold uses, by their role; few shots leave recordings out by design."""
+    """Return numbers of recordings that no fold uses, by role, as texts; empty for few-shot splits, by design."""
     if shots(split) is not None:
         return {}
     unused = [meta.role for meta, mask in zip(data.metas, data.parted(used), strict=True) if not mask.any()]
@@ -191,9 +191,9 @@ def without_part(data: Dataset, split: str, used: Mask) -> dict[str, int]:
 
 
 def training_sessions(data: Dataset) -> list[str]:
-    """Return the sessions to train on, those first that few shots take first.
+    """Return the names of the sessions to train on, in the order in which few-shot splits use them.
 
-    Sessions with recordings of role train and none of role test, in order of their names, numbers read as numbers.
+    These sessions have recordings of role train and none of role test; numbers in names are ordered as numbers.
     """
     tested = {meta.session for meta in data.metas if meta.role == "test"}
     found = {meta.session for meta in data.metas if meta.role == "train"} - tested
@@ -203,19 +203,19 @@ def training_sessions(data: Dataset) -> list[str]:
 
 
 def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_one: bool = False) -> list[Assignment]:
-    """Return the folds of `split`.
+    """Return the folds, masks of training, test and validation rows, of the split called `split`.
 
     Parameters
     ----------
     one_by_one
-        Leave each group out alone, as those of `ONE_BY_ONE`, rather than dealing groups into folds, if there are no
-        more than `MOST_ONE_BY_ONE`.
+        True to make each group a fold of its own, as with `ONE_BY_ONE`, in place of folds of several groups, if there
+        are at most `MOST_ONE_BY_ONE` groups.
     gap
-        Rows left out between training and test where a recording is cut in time: the longest window that may be chosen.
+        Rows left out between training and test where a recording is cut in time: those of the longest mean filter.
 
     Notes
     -----
-    Recordings whose role is ``test`` are an official test set: only split ``roles`` touches them.
+    Recordings of role ``test`` are used only by split ``roles`` and few-shot splits, or if there are no others.
     """
     number = shots(split)
     if split == "roles" or number is not None:
@@ -234,18 +234,18 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
 
 
 def _open_to_folds(data: Dataset) -> list[int]:
-    """Return the recordings that cross-validation may use."""
+    """Return indices of the recordings for cross-validation: those not of role test, or all if there are no others."""
     free = [place for place, meta in enumerate(data.metas) if meta.role != "test"]
     return free or list(range(len(data.tables)))
 
 
 def _open_rows(data: Dataset) -> Mask:
-    """Return the rows of the recordings that cross-validation may use, as a mask."""
+    """Return a mask of the rows of the recordings for cross-validation."""
     return np.isin(data.recording, _open_to_folds(data))
 
 
 def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
-    """Return the official sets; of few shots only the first `number` training sessions, without validation."""
+    """Return the fold given by roles; with a `number`, train on that many sessions only, without validation rows."""
     train, validation, test = (
         data.column(lambda table: table.meta.role == role)  # noqa: B023
         for role in ("train", "validation", "test")
@@ -256,7 +256,7 @@ def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
 
 
 def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
-    """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
+    """Yield one fold for each session: train on the first part of each of its recordings, test on the rest."""
     opened, session = _open_rows(data), data.column(lambda table: table.meta.session)
     for name in np.unique(session[opened]).tolist():
         train, test = _cut_in_time(data, opened & (session == name), gap, fewest=10)
@@ -265,7 +265,7 @@ def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
 
 
 def _cut_in_time(data: Dataset, rows: Mask, gap: int, fewest: int) -> tuple[Mask, Mask]:
-    """Return the first part in time of each recording and, after a gap, the last; none of fewer labelled rows."""
+    """Return masks of each recording's first and last part, with a gap between; both empty below `fewest` labels."""
     before, after = [], []
     for table, mask in zip(data.tables, data.parted(rows), strict=True):
         labelled, number = np.flatnonzero(mask & table.labelled), np.arange(len(table.row))
@@ -277,7 +277,7 @@ def _cut_in_time(data: Dataset, rows: Mask, gap: int, fewest: int) -> tuple[Mask
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
-    """Add to the name of a fold that tests one single number whether training had numbers on both sides of it."""
+    """Add "interpolated" or "extrapolated" to the name of a fold with one test value, by the range of training."""
     y = data.column(lambda table: table.y)
     if data.classes or y.ndim > 1:
         return fold
@@ -289,9 +289,9 @@ def _told(fold: Assignment, data: Dataset) -> Assignment:
 
 
 def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
-    """Deal groups into folds of about equal size, the largest first into the emptiest, of equal ones the first by name.
+    """Divide groups into folds of about equal size: the largest first, each into the smallest fold, ties by name.
 
-    Neither chance nor the order of files decides; scikit-learn's ``GroupKFold`` takes equal groups in another order.
+    The result depends neither on chance nor on the order of files; scikit-learn's ``GroupKFold`` breaks ties otherwise.
     """
     folds: list[set[str]] = [set() for _ in range(min(FOLDS, len(sizes)))]
     filled = [0] * len(folds)
@@ -308,12 +308,12 @@ def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignm
 
 
 def _labels(data: Dataset, group: str) -> npt.NDArray[Any]:
-    """Return (rows,) labels of a group; empty ones of recordings that have none."""
+    """Return the (rows,) group labels called `group`; empty texts for recordings without such labels."""
     return data.column(lambda table: table.groups.get(group, ""))
 
 
 def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
-    """Deal rows at random; where recordings are answered whole, deal those, class by class, in about equal shares."""
+    """Yield folds of random rows; for tasks on whole recordings, of random recordings with about equal classes."""
     rng = np.random.default_rng(seed)
     places, folds = _open_to_folds(data), FOLDS
     if data.whole:
@@ -332,11 +332,11 @@ def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
 
 
 def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[Mask, Mask]]:
-    """Return (train, validation) masks inside the training rows of `outer`, for choosing hyper-parameters.
+    """Divide the training rows of `outer` into (train, validation) masks, for choosing hyper-parameters.
 
-    What the outer split keeps apart is kept apart here too: each session (or group) is left out once, in five folds
-    where there are more than five. With a single one, the last fifth in time of each recording is held back; where
-    recordings are answered whole, a fifth of them.
+    The groups that the outer split keeps apart are kept apart here too: each group validates once, in at most five
+    folds. With a single group, the last fifth of each recording validates; for tasks on whole recordings, the
+    recordings are then the groups.
     """
     groups, sizes = outer.groups, _sizes(data, outer.train, outer.groups)
     if data.whole and len(sizes) < 2:
@@ -348,9 +348,9 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[M
 
 
 def with_validation(outer: Assignment, data: Dataset) -> Assignment:
-    """Return a fold whose training recordings are parted in some to learn from and some to choose a threshold on.
+    """Return a fold whose training rows are divided into rows for fitting and rows for choosing a threshold.
 
-    Of the inner splits so many as it takes to validate on events and on disturbances, if there are any.
+    The latter are the validation rows of as many inner splits as needed to include events and disturbances, if any.
     """
     y, disturbance = data.column(lambda table: table.y), data.column(lambda table: table.slip.disturbance)
 
@@ -367,22 +367,22 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
                 return replace(outer, train=learn, validation=check)
             break
     raise DataError(
-        f"The training recordings of fold {outer.name!r} cannot be parted in some to learn from and some to choose a "
-        "threshold on, each with events.",
-        hint="Give more of them, or recordings of the role validation.",
+        f"The training recordings of fold {outer.name!r} cannot be divided into recordings for fitting and recordings "
+        "for choosing the threshold, each with events.",
+        hint="Add training recordings with events, or recordings of the role validation.",
     )
 
 
 def _sizes(data: Dataset, rows: Mask, group: str) -> dict[str, int]:
-    """Return how many of some rows each group has that are labelled."""
+    """Return the number of labelled rows in each group, among the rows in a mask."""
     values, counts = np.unique(_labels(data, group)[rows & data.labelled], return_counts=True)
     return dict(zip(values.tolist(), counts.tolist(), strict=True))
 
 
 def over_rows(assignment: Assignment, made: Dataset, recorded: Dataset) -> Assignment:
-    """Return an assignment of derived rows (frames, windows) as one of all rows recorded.
+    """Return a fold of derived rows (windows, frames, whole recordings) as masks over all recorded rows.
 
-    Of windows their last rows; all rows of a recording that was made to frames, or to one row.
+    For windows, their last rows are marked; for frames and whole recordings, all rows of the recording.
     """
 
     def spread(rows: Mask) -> Mask:

@@ -1,6 +1,6 @@
-"""Features of windows: of recordings that are answered as a whole, and of frames.
+"""Features of whole recordings and of frames, from summaries such as the mean over a window.
 
-Frames are windows that end at regular times, each made of every stream's own samples in it, and of none after it.
+Frames are windows that end at regular times; their features use each stream's own samples, and none after the end.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ STATES = ("stick", "incipient", "gross")
 EVENT_CLASSES = ("no event", "event")
 
 FrameFeatures = tuple[tuple[str, ...], FloatArray]
-"""Names, and (frames, features) numbers; NaN where a stream has no sample in the window."""
+"""Names of features, and (frames, features) numbers; NaN where a stream has no sample in the frame."""
 Features = Mapping[str, float]
 
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
-    """Return whether a recording becomes one row of summaries; under a first-row protocol it is one already."""
+    """Return True if each recording becomes one row of summaries; False under a protocol that keeps the first row."""
     return task.answer_per == "recording" and bool(task.summaries or task.features_by) and not rules.first_row_only
 
 
 def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
-    """Return each recording as one row of features of the samples that the protocol keeps; `data` without summaries.
+    """Return a data set with one row of summaries per recording; `data` itself if the task does not summarise.
 
-    The row stands where the recording ends: it is the first at which the answer can be known.
+    The summaries are of the samples that the protocol keeps; the row is the recording's last, when all are known.
     """
     if not is_summarised(task, rules):
         return data
     if rules.three_sigma or rules.discard_samples:
         raise NotApplicable(
-            f"Protocol {rules.name!r} drops single samples; task {task.name!r} summarises whole recordings, and a "
-            "summary over what is left would be of another signal.",
+            f"Protocol {rules.name!r} drops single samples, but task {task.name!r} summarises whole recordings, which "
+            "need consecutive samples.",
             hint="Use protocol `deployable`.",
         )
     compute = recording_features(task, rules)
@@ -58,16 +58,16 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
             raise PluginContractError(
                 f"{task.features_by} gave other features for recording {table.meta.name!r} than for "
                 f"{data.tables[0].meta.name!r}.",
-                hint="It must give the same names in the same order for every recording.",
+                hint="The function must return the same names of features in the same order for every recording.",
             )
     tables = tuple(_one_row(table, row) for table, row in zip(data.tables, rows, strict=True))
     return replace(data, tables=tables, features=names)
 
 
 def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: ProtocolSpec) -> EstimatorDescriptor:
-    """Return `estimator` with the mean filters that it may choose from.
+    """Return `estimator` with the lengths of the mean filter among which to choose for this task and protocol.
 
-    There is none where a recording is one row, for there is nothing before it; one where the protocol states it.
+    The only length is 0 if the task has summaries, or that of the protocol if stated; else the estimator's own apply.
     """
     one = bool(task.summaries or task.features_by)
     windows = (0,) if one else estimator.window_grid if rules.k is None else (rules.k,)
@@ -75,7 +75,7 @@ def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: Protocol
 
 
 def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table], Features]:
-    """Return the function to one recording's features; the task's own code is imported here."""
+    """Return the function that computes the features of one recording, and import the task's own code for that."""
     own = load_object(task.features_by) if task.features_by else None
 
     def compute(table: Table) -> Features:
@@ -92,8 +92,8 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
             more = own(streams)
             if not more or not all(np.isfinite(value) for value in more.values()):
                 raise PluginContractError(
-                    f"{task.features_by} gave no finite number by name for recording {table.meta.name!r}.",
-                    hint="It gets a tuple of StreamReadings and must return a mapping of names to finite numbers.",
+                    f"{task.features_by} gave no or not only finite numbers for recording {table.meta.name!r}.",
+                    hint="Given a tuple of StreamReadings, it must return a mapping of names to finite numbers.",
                 )
             found |= {name: float(value) for name, value in more.items()}
         for name, value in found.items():
@@ -104,12 +104,12 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
 
 
 def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
-    """Return the columns of a stream that a summary is of."""
+    """Return indices of the columns of a stream whose kind of channel is summarised by `summary`."""
     return [place for place, kind in enumerate(stream.kinds) if not summary.kinds or kind in summary.kinds]
 
 
 def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the readings that the protocol keeps, tared as it has it; times count from the first of them."""
+    """Return the streams of a recording after the dropped start, tared if the protocol tares; times start there."""
     begin_s, found = dropped_s(table.meta, rules), []
     for stream in tared_readings(table, rules):
         data, time_s = stream.data, stream.time_s
@@ -119,14 +119,14 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
         if not len(data):
             raise DataError(
                 f"Recording {table.meta.name!r} has no sample of {stream.stream} that the protocol keeps.",
-                hint="Record it again, or leave it out.",
+                hint="Record it again, or leave the recording out.",
             )
         found.append(replace(stream, data=data, time_s=time_s))
     return tuple(found)
 
 
 def tared_readings(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the streams of a recording; if the protocol tares, those with a clock less their means over the hold."""
+    """Return the streams of a recording; those with a clock minus their means over the hold, if the protocol tares."""
     return tuple(
         one if one.time_s is None or not rules.tare
         else replace(one, data=less_rest(one.data, one.time_s < hold_s(table.meta)))
@@ -135,16 +135,16 @@ def tared_readings(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, .
 
 
 def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
-    """Return (channels,) numbers, from the samples in the summary's window; a filter has seen those before it too."""
+    """Return the (channels,) values of a summary over its window; a band filter also uses earlier samples."""
     rows = _window(stream, summary, recording)
     values = in_band(stream, summary.band_hz, recording)[rows]
     return np.asarray(measured(values, summary.measure, np.array([0]), np.array([len(values)]))[0])
 
 
 def measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) -> FloatArray:
-    """Return (windows, channels) of rows ``first .. last`` (excluded) of `values`; NaN for a window without a row.
+    """Return the (windows, channels) `measure` of ``values[first:last]`` for each window; NaN for an empty window.
 
-    Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
+    Sums are differences of running sums from the first sample, so that no digit depends on later samples.
     """
     if measure == "range":
         found = spread(values, first, last)
@@ -178,35 +178,35 @@ def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
         return slice(first, max(math.ceil(summary.end * n), first + 1))
     if stream.time_s is None:
         raise NotApplicable(
-            f"{summary.name!r} is a window in seconds, and recording {recording!r} has no clock.",
-            hint="State the clock or the rate in the mapping, or ask for shares of the recording.",
+            f"The summary {summary.name!r} has a window in seconds, but recording {recording!r} has no clock.",
+            hint="State the clock or the rate in the mapping, or give the window in shares of the recording.",
         )
     step_s = 0.0 if stream.rate_hz is None else 1.0 / stream.rate_hz
     first, last = (int(place) for place in np.searchsorted(stream.time_s, [summary.start, summary.end]))
     # The last sample stands for the interval after it.
     if first == last or stream.time_s[-1] + step_s * (1 + 1e-6) < summary.end:
         raise DataError(
-            f"Recording {recording!r} has {stream.time_s[-1]:.4g} s of {stream.stream} that the protocol keeps, and "
-            f"{summary.name!r} needs {summary.end:g} s.",
-            hint="Leave the recording out, or ask for shares of the recording.",
+            f"Recording {recording!r} has {stream.time_s[-1]:.4g} s of {stream.stream} that the protocol keeps, but "
+            f"summary {summary.name!r} needs {summary.end:g} s.",
+            hint="Leave the recording out, or give the window in shares of the recording.",
         )
     return slice(first, last)
 
 
 def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recording: str) -> FloatArray:
-    """Return a stream after a causal band-pass, at rest at its first sample; without a band, as it is."""
+    """Return a stream's (n, channels) samples through a causal band-pass, whose output starts at 0; None: no filter."""
     if band_hz is None:
         return stream.data
     if stream.rate_hz is None:
         raise NotApplicable(
-            f"A band in Hz needs a sampling rate, and recording {recording!r} states none for {stream.stream}.",
-            hint="State the clock or the rate in the mapping, or ask for another summary.",
+            f"A band in Hz needs a sampling rate, but recording {recording!r} states no rate of {stream.stream}.",
+            hint="State the clock or the rate in the mapping, or choose a summary without a band.",
         )
     if band_hz[1] >= stream.rate_hz / 2:
         raise NotApplicable(
             f"The band {band_hz[0]:g}-{band_hz[1]:g} Hz cannot be observed: {stream.stream} of recording {recording!r} "
             f"is sampled at {stream.rate_hz:.4g} Hz, which shows nothing above {stream.rate_hz / 2:.4g} Hz.",
-            hint="Ask for a lower band, or limit the summary to the `kinds` of channels that are fast enough.",
+            hint="Choose a lower band, or limit the summary to the `kinds` of channels that are fast enough.",
         )
     signal = importlib.import_module("scipy.signal")
     sections = signal.butter(2, band_hz, "bandpass", fs=stream.rate_hz, output="sos")
@@ -214,7 +214,7 @@ def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recordi
 
 
 def _one_row(table: Table, features: Features) -> Table:
-    """Return a recording as its last row, with other features."""
+    """Return a recording's last row with these features, and the first label of the recording."""
     last, labelled = table.taken(slice(-1, None)), np.flatnonzero(table.labelled)
     return replace(
         last, X=np.array([list(features.values())], dtype=np.float64), force=None, readings=(),
@@ -223,10 +223,10 @@ def _one_row(table: Table, features: Features) -> Table:
 
 
 def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
-    """Return each recording as frames, with the features that `estimator` looks at."""
+    """Return a data set with one row for each frame, with the features that `estimator` uses."""
     if rules.three_sigma or rules.discard_samples or rules.first_row_only:
         raise NotApplicable(
-            f"Protocol {rules.name!r} drops single samples; task {task.name!r} looks at windows of consecutive ones.",
+            f"Protocol {rules.name!r} drops single samples, but task {task.name!r} needs consecutive samples.",
             hint="Use protocol `deployable`.",
         )
     counts = Counter(data.counts)
@@ -239,7 +239,7 @@ def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: Estima
 def frame_features(
     task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
 ) -> Callable[[Table, IntArray], FrameFeatures]:
-    """Return the function to the features of all frames of a recording; a detector's own code is imported here."""
+    """Return the function from a recording and ends of frames [ns] to features, and import a detector's own code."""
     target = slip_target(task)
     own = load_object(estimator.frames_by) if estimator.frames_by else None
     summaries = estimator.summaries or task.summaries
@@ -271,8 +271,8 @@ def frame_features(
                 names += [f"{stream.channels[place]} {summary.name}" for place in picked]
         if not columns:
             raise NotApplicable(
-                f"{estimator.name} looks at {', '.join(one.name for one in summaries)}; {table.meta.sensor.name} has "
-                f"no such channel that task {task.name!r} looks at: {band_limit(streams)}.",
+                f"{estimator.name} needs {', '.join(one.name for one in summaries)}, but {table.meta.sensor.name} has "
+                f"no channel for these in task {task.name!r}: {band_limit(streams)}.",
                 hint="Choose another estimator.",
             )
         return tuple(names), np.hstack(columns)
@@ -281,34 +281,34 @@ def frame_features(
 
 
 def band_limit(streams: Sequence[StreamReadings]) -> str:
-    """Return the limit of the fastest stream as text."""
+    """Return a text that states the highest observable frequency of the fastest stream."""
     one = fastest(streams)
     return f"band not observable above {(one.rate_hz or 0.0) / 2:.4g} Hz, half the rate of {one.stream}"
 
 
 def fastest(streams: Sequence[StreamReadings]) -> StreamReadings:
-    """Return the stream of the highest rate."""
+    """Return the stream with the highest sampling rate."""
     return max(streams, key=lambda one: one.rate_hz or 0.0)
 
 
 def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
-    """Return the streams of a recording, tared as the protocol has it; raises NotApplicable if one has no clock."""
+    """Return the streams of a recording, tared if the protocol tares; raise NotApplicable if a stream has no clock."""
     streams = tared_readings(table, rules)
     for stream in streams:
         if stream.time_s is None:
             raise NotApplicable(
-                f"Frames end at times, and {stream.stream} of recording {table.meta.name!r} has no clock.",
+                f"Frames need times, but {stream.stream} of recording {table.meta.name!r} has no clock.",
                 hint="State the clock or the rate in the mapping.",
             )
         if not len(stream.data):
-            raise DataError(f"Recording {table.meta.name!r} has no sample of {stream.stream}.", hint="Leave it out.")
+            raise DataError(f"Recording {table.meta.name!r} has no {stream.stream} sample.", hint="Omit the recording.")
     return streams
 
 
 def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
-    """Return (n,) when the frames of a recording end, ns since the first row of the sensor's clock.
+    """Return the (n,) end times of a recording's frames [ns], since the first row of the sensor's clock.
 
-    Every stream has samples throughout each frame; the hold is left out where the protocol drops it.
+    Frames lie within the time span of every stream, and after the hold if the protocol drops it.
     """
     target = slip_target(task)
     streams = clocked(table, rules)
@@ -318,7 +318,7 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
     ends_ns = np.arange(first, nanoseconds(end_s) + 1, nanoseconds(target.hop_s), dtype=np.int64)
     if not ends_ns.size:
         raise DataError(
-            f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
+            f"Recording {table.meta.name!r} is shorter than a frame, {target.window_s:g} s.", hint="Omit the recording."
         )
     return ends_ns
 
@@ -353,7 +353,7 @@ def _framed(
 
 
 def slip_target(task: TaskSpec) -> SlipTarget:
-    """Return the target of a task of frames."""
+    """Return the target of a task on frames, which is always slip."""
     assert isinstance(task.target, SlipTarget)
     return task.target
 
@@ -374,6 +374,6 @@ def _own_features(
     if found.ndim != 2 or len(found) != len(ends_s) or np.isinf(found).any():
         raise PluginContractError(
             f"{estimator.frames_by} gave an array of shape {found.shape} for {len(ends_s)} frames.",
-            hint="It must return (frames, features) finite numbers, or NaN where there is no answer.",
+            hint="The function must return a (frames, features) array of finite numbers, or NaN for no answer.",
         )
     return tuple(f"{stream.channels[0]} {estimator.name} {place + 1}" for place in range(found.shape[1])), found

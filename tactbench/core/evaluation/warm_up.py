@@ -1,4 +1,4 @@
-"""Work done once in a process before any clock is read: imports, and the first use of libraries."""
+"""Work done once per process before times are measured: imports, and the first use of libraries."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 
 
 def import_libraries() -> None:
-    """Import what every cell needs, so that processes forked later share it."""
+    """Import the modules that every cell needs, so that processes forked later need not import them."""
     for name in ("threadpoolctl", "scipy.special", "tactbench.core.evaluation.cell"):
         importlib.import_module(name)
 
 
 def rehearse(estimator: Estimator, kind: str) -> None:
-    """Fit `estimator` to a few made-up rows of a task of this kind and predict, with one thread.
+    """Fit `estimator` to a few random rows for a task of this kind and predict, with one thread.
 
-    Libraries put off work until their first fit (looking for other libraries, generating code): some
-    tenths of a second. Processes forked from here need not do it again.
+    Libraries delay some work (finding other libraries, generating code) until the first fit, where it takes some
+    tenths of a second. Processes forked afterwards need not repeat this work.
     """
     import numpy as np
 

@@ -1,1 +1,1 @@
-"""Events in time: alarms of a detector under a stated policy, matched with true events, scored at every threshold."""
+"""Events in time: raise a detector's alarms by a policy, match them with true events, and score every threshold."""

@@ -1,6 +1,6 @@
-"""Alarms: raised from frames, matched with events, and scored by hits, latency and false alarms over stated seconds.
+"""Raise alarms from frames, match alarms with true events, and compute hits, latency and false alarms per minute.
 
-Frames have their metrics in :mod:`tactbench.core.evaluation.metrics` (``balanced_accuracy``, ``macro_f1``).
+Metrics of single frames are in :mod:`tactbench.core.evaluation.metrics` (``balanced_accuracy``, ``macro_f1``).
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
 
 def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -> IntArray:
-    """Return when alarms are known [ns], in order of time.
+    """Return the (m,) times of alarms [ns], in rising order.
 
     Parameters
     ----------
     t_ns
-        (n,) when each frame's answer is known, strictly rising: the end of its window. What the detector needs to
-        compute it is added by the caller. Where samples are lost, the caller cuts: neighbours are taken as neighbours.
+        (n,) end of each frame [ns], strictly rising. The caller adds the detector's computing time, if wanted. Adjacent
+        frames are taken as consecutive, so that the caller must divide the data where samples are lost.
     active
-        (n,) whether the frame says "event", such as ``score >= threshold``.
+        (n,) True for frames classified as event, for example ``score >= threshold``.
     policy
-        Merging, minimum length and refractory time.
+        Largest gap to merge, minimum length and refractory time.
 
     Notes
     -----
-    An alarm at t depends on frames up to t alone. Active frames belong to one segment if they are neighbours or at
+    An alarm at time t depends on frames up to t alone. Active frames belong to one segment if they are adjacent or at
     most `merge_gap_s` apart. A segment raises one alarm, at its first active frame at least `minimum_length_s` after
-    its first frame; within a gap it is unknown whether it will be bridged. An alarm less than `refractory_s` after the
-    last one that was kept is dropped.
+    its first frame, and never within a gap, which may not be bridged. An alarm less than `refractory_s` after the
+    previous alarm kept is dropped.
     """
     on = np.flatnonzero(active)
     if on.size == 0:
@@ -49,7 +49,7 @@ def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -
 
 
 def _kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
-    """Return the places of the alarms that the refractory time leaves, of alarms in order of time."""
+    """Return the indices of the alarms kept under the refractory time [ns]; the given times [ns] must be rising."""
     following = np.searchsorted(raised_ns, raised_ns + max(refractory_ns, 1)).tolist()
     places, place = [], 0
     while place < len(following):
@@ -59,25 +59,25 @@ def _kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
 
 
 def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[IntArray, IntArray]:
-    """Return the places of matched onsets and those of their alarms, as many pairs as there can be.
+    """Match onsets of events with alarms; return the indices of matched onsets and, in pairs, of their alarms.
 
     Parameters
     ----------
     onset_ns, alarm_ns
         (n,) and (m,) times [ns], in any order.
     policy
-        Its window: an alarm may hit an onset from `window_before_s` before to `window_after_s` after it, both ends
-        included.
+        Policy whose window limits pairs: an alarm matches an onset from `window_before_s` before the onset to
+        `window_after_s` after it, both ends included.
 
     Notes
     -----
-    In order of time each event takes the earliest alarm that is left in its window. All windows are equally long, so
-    that their beginnings and ends come in the same order: an alarm passed over is too early for all later events, and
-    to take the earliest leaves every later event at least as much choice. The number of pairs is therefore the largest
-    possible [1]_ (a convex bipartite graph whose intervals do not nest). It takes O(n log n + m log m).
+    In order of time, each event is paired with the earliest unpaired alarm in its window. All windows are equally long,
+    so that their starts and ends are in the same order: a skipped alarm is too early for all later events, and taking
+    the earliest alarm leaves later events at least as many alarms. The number of pairs is therefore the largest
+    possible [1]_ (a convex bipartite graph whose intervals do not nest). The time is O(n log n + m log m).
 
-    Of all largest matchings this is the one of first alarms: an event that is announced twice within its window has the
-    latency of the first announcement, and the second is a false positive.
+    Of all largest matchings this one has the first alarms: if two alarms are in the window of one event, the first
+    gives the latency, and the second is a false positive.
 
     References
     ----------
@@ -101,85 +101,85 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """The events of one recording."""
+    """The true events of one recording, and the time in which alarms are possible."""
 
     event_ns: IntArray
     """(e, 2) onset and end of each event [ns]."""
     disturbance: bool
-    """Whether the recording as a whole is a disturbance: a press, a tap, a motor that starts."""
+    """True if the whole recording is a disturbance without event: a press, a tap, a motor that starts."""
     span_ns: tuple[int, int]
-    """From when until when (excluded) the detector could raise alarms [ns]."""
+    """Start and end (excluded) of the time in which the detector could raise alarms [ns]."""
 
 
 @dataclass(frozen=True)
 class EventScores:
-    """Counts and latencies over all events of some recordings, and the scores that follow from them.
+    """Counts of alarms and latencies of events over several recordings, and scores such as recall and precision.
 
-    The shape (...) is () for one set of alarms and (k,) for k thresholds. NaN is undefined: precision without an
-    alarm, recall without an event, a rate without seconds, a latency without a hit.
+    The shape (...) is () for one set of alarms and (k,) for k thresholds. Undefined scores are NaN: precision without
+    an alarm, recall without an event, a rate over zero seconds, a latency without a hit.
     """
 
     n_alarms: IntArray
-    """(...) alarms, those outside the time base of false alarms included."""
+    """(...) numbers of all alarms, including alarms at times in which false alarms are not counted."""
     n_false_alarms: IntArray
-    """(...) alarms within that time base."""
+    """(...) numbers of alarms within the time base, the time in which every alarm counts as false."""
     base_ns: int
-    """Length of that time base [ns]."""
+    """Length of the time base of false alarms [ns], over all recordings."""
     latency_s: FloatArray
-    """(..., e) alarm minus onset of each event [s], negative is early; NaN is a miss."""
+    """(..., e) time of the alarm minus onset, for each event [s]; negative for an early alarm, NaN for a miss."""
 
     @property
     def n_hits(self) -> IntArray:
-        """Return (...) how many events were hit."""
+        """Return the (...) numbers of events that an alarm hit."""
         return np.asarray(np.isfinite(self.latency_s).sum(axis=-1), dtype=np.int64)
 
     @property
     def n_misses(self) -> IntArray:
-        """Return (...) how many were not."""
+        """Return the (...) numbers of events that no alarm hit."""
         return np.asarray(self.latency_s.shape[-1] - self.n_hits)
 
     @property
     def recall(self) -> FloatArray:
-        """Return (...) hits of events."""
+        """Return the (...) recall: hits over events."""
         return _ratio(self.n_hits, self.latency_s.shape[-1])
 
     @property
     def precision(self) -> FloatArray:
-        """Return (...) hits of alarms; a second alarm on one event is no hit."""
+        """Return the (...) precision: hits over alarms; a second alarm for the same event is not a hit."""
         return _ratio(self.n_hits, self.n_alarms)
 
     @property
     def f1(self) -> FloatArray:
-        """Return (...) twice the hits of alarms and events together."""
+        """Return the (...) F1 scores: twice the hits over the sum of alarms and events."""
         return _ratio(2 * self.n_hits, self.n_alarms + self.latency_s.shape[-1])
 
     @property
     def false_alarms_per_minute(self) -> FloatArray:
-        """Return (...) false alarms per minute of the time base [1/min]."""
+        """Return the (...) rates of false alarms: their number per minute of the time base [1/min]."""
         return _ratio(self.n_false_alarms, self.base_ns / 1e9 / 60.0)
 
     def latency_percentile_s(self, percent: float) -> float:
-        """Return a percentile of the latency over hits of one set of alarms, linear between order statistics [s].
+        """Return a percentile [s] of the latency over the events hit, for one set of alarms; NaN without a hit.
 
-        Never to be shown without :attr:`n_misses`: a detector that hits only the easy events looks quick.
+        Always show it with :attr:`n_misses`: a detector that hits only the easy events has low latencies.
         """
         hits = self.latency_s[np.isfinite(self.latency_s)]
         return float(np.percentile(hits, percent)) if hits.size else np.nan
 
     def row(self, place: Any) -> EventScores:
-        """Return the scores at one threshold, or at several."""
+        """Return the scores at one threshold, or at several, selected by index."""
         return EventScores(self.n_alarms[place], self.n_false_alarms[place], self.base_ns, self.latency_s[place])
 
 
 def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], policy: AlarmPolicy) -> EventScores:
-    """Score the alarms [ns] of each recording; nothing is matched across recordings.
+    """Score the alarm times [ns] against the true events, recording by recording, and add up the counts.
 
     Notes
     -----
-    Precision, recall and F1 are those of onset detection [1]_: matched pairs of all alarms and of all events. The
+    Precision, recall and F1 are those of onset detection [1]_: matched pairs over all alarms, or over all events. The
     latency is the signed offset of [2]_; unlike there, further alarms within one window are false positives. Alarms
-    outside the time base (a second one in a window, one late in an event) lower the precision, not the rate of false
-    alarms.
+    outside the time base (a second alarm in a window, an alarm late in an event) lower the precision, but do not
+    raise the rate of false alarms.
 
     References
     ----------
@@ -197,7 +197,7 @@ def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], p
 
 
 def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> FloatArray:
-    """Return (e,) the matched alarm minus the onset of each event [s]; NaN is a miss."""
+    """Return the (e,) latencies [s], time of the matched alarm minus onset of each event; NaN for a miss."""
     latency = np.full(onset_ns.size, np.nan)
     event, alarm = match(onset_ns, alarm_ns, policy)
     latency[event] = (alarm_ns[alarm] - onset_ns[event]) / 1e9
@@ -207,19 +207,19 @@ def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> Fl
 def displacement_at_detection(
     onset_ns: IntArray, latency_s: FloatArray, t_ns: IntArray, displacement_m: FloatArray
 ) -> FloatArray:
-    """Return (e,) how far the surface moved from each onset to its alarm [m].
+    """Return the (e,) displacements of the surface from the onset of each event to its alarm [m].
 
     Parameters
     ----------
     onset_ns, latency_s
-        (e,) as of the truth and the scores.
+        (e,) onsets of events [ns], and latencies of their alarms [s].
     t_ns, displacement_m
-        (n,) relative displacement over time, of the reference; straight between its samples.
+        (n,) times [ns] and relative displacement [m] of the reference, interpolated linearly.
 
     Notes
     -----
-    Zero or the other sign where the alarm came before the onset. NaN for a miss, and where onset or alarm lies outside
-    the stream: nothing is extrapolated.
+    An alarm before the onset gives zero or the opposite sign. The value is NaN for a miss, and if onset or alarm is
+    outside the times of the reference, since nothing is extrapolated.
     """
     start = t_ns[0]
     clock, onset = (t_ns - start) / 1e9, (onset_ns - start) / 1e9
@@ -228,9 +228,9 @@ def displacement_at_detection(
 
 
 def time_base(truth: GroundTruth, policy: AlarmPolicy, t_ns: IntArray) -> tuple[IntArray, int]:
-    """Return (n,) which times lie where false alarms are counted, 0 or 1, and how long that is in all [ns].
+    """Return (n,) 1 for times within the time base of false alarms, else 0, and the length of the time base [ns].
 
-    It is the time that the policy names, without every event and its window: half-open stretches between edges.
+    The time base is the time that the policy names, as half-open intervals, without all events and their windows.
     """
     named = truth.disturbance or policy.false_alarm_time == "non-events"
     begin, close = truth.span_ns
@@ -245,6 +245,6 @@ def time_base(truth: GroundTruth, policy: AlarmPolicy, t_ns: IntArray) -> tuple[
 
 
 def _ratio(part: IntArray, whole: IntArray | float) -> FloatArray:
-    """Return part of whole; NaN where the whole is nothing."""
+    """Return `part` divided by `whole`; NaN where the latter is zero."""
     nothing = np.full(np.shape(part), np.nan)
     return np.asarray(np.divide(part, whole, out=nothing, where=np.asarray(whole) > 0))

@@ -1,8 +1,8 @@
-"""All thresholds of a score at once, and the one chosen on validation.
+"""Scores of a detector at all thresholds, and the choice of a threshold on validation recordings.
 
-The idea is that of sed_scores_eval (Ebbers, Haeb-Umbach and Serizel 2022, Threshold independent evaluation of sound
-event detection scores, ICASSP): between two neighbouring thresholds at which an alarm appears, moves or goes, nothing
-changes, so that a curve over those thresholds has no error of a grid.
+The method is that of sed_scores_eval (Ebbers, Haeb-Umbach and Serizel 2022, Threshold independent evaluation of sound
+event detection scores, ICASSP): alarms change only at certain thresholds, so that a curve over these thresholds is
+exact, unlike one over a grid.
 """
 
 from __future__ import annotations
@@ -20,53 +20,53 @@ from tactbench.core.spec.events import AlarmPolicy
 
 @dataclass(frozen=True)
 class ScoredRecording:
-    """A detector's score over one recording, and the recording's events."""
+    """A detector's scores of the frames of one recording, and the recording's true events."""
 
     t_ns: IntArray
-    """(n,) when each score is known, the detector's compute time included [ns]."""
+    """(n,) time at which the score of each frame is available [ns]."""
     score: FloatArray
-    """(n,) a frame is active where ``score >= threshold``; NaN: no answer yet, never active."""
+    """(n,) scores; a frame is active if ``score >= threshold``, and never if its score is NaN (no answer)."""
     truth: GroundTruth
 
 
 @dataclass(frozen=True)
 class ThresholdCurve:
-    """Scores at every threshold at which they change."""
+    """Event scores at every threshold at which alarms change."""
 
     threshold: FloatArray
-    """(k,) rising; the last is infinity, where there is no alarm. Row i holds for all thresholds above the one before,
-    up to its own."""
+    """(k,) rising thresholds; the last is infinity, without alarms. Row i of `scores` holds for thresholds above
+    ``threshold[i - 1]`` and up to ``threshold[i]``."""
     scores: EventScores
-    """Of shape (k,)."""
+    """Scores of shape (k,), one row for each threshold."""
 
     def at(self, threshold: float | FloatArray) -> EventScores:
-        """Return the scores at any threshold, or several, above minus infinity."""
+        """Return the scores at one finite or infinite threshold above minus infinity, or at an array of thresholds."""
         return self.scores.row(np.searchsorted(self.threshold, threshold, side="left"))
 
     def operating_point(self, max_false_alarms_per_minute: float) -> float:
-        """Return the threshold of largest recall among those with at most so many false alarms per minute.
+        """Return the threshold with the largest recall, within this bound of false alarms per minute.
 
-        Of equal recalls the larger F1 decides, then the higher threshold. Infinity: no finite one keeps the bound and
-        hits anything. It is chosen on validation recordings and applied to others with :meth:`at`.
+        Ties are broken by the larger F1, then by the higher threshold. Infinity is returned if no finite threshold
+        within the bound is better. Choose it on validation recordings, and apply it to others with :meth:`at`.
 
         Notes
         -----
-        The rate need not fall with the threshold (a score that is always active is one segment and one alarm), so all
-        rows are looked at.
+        A higher threshold need not lower the rate of false alarms (if all frames are active, they are one segment with
+        one alarm), so all thresholds are compared.
         """
         return float(self.threshold[self._allowed(max_false_alarms_per_minute)[0]])
 
     def found_share(self, max_false_alarms_per_minute: float) -> FloatArray:
-        """Return (e,) at which share of the rates from 0 to the largest each event is hit.
+        """Return, for each event, the share of bounds from 0 to this maximum of false alarms at which it is hit, (e,).
 
-        At a rate that is allowed the threshold is its operating point on these recordings. The mean over events is the
-        area under recall against false alarms per minute up to that rate, over the rate.
+        For each bound, the threshold is the operating point on these recordings. The mean over events is the area
+        under recall over false alarms per minute up to the maximum, divided by the maximum.
 
         Notes
         -----
         A partial area under a curve, normalised (McClish 1989, Analyzing a portion of the ROC curve, Medical Decision
         Making 9, 190-195), over false alarms per time as in Bilen et al. 2020, A framework for the robust evaluation of
-        sound event detection, ICASSP. The curve is a staircase that never falls: nothing is drawn between two points.
+        sound event detection, ICASSP. The curve is a rising step function, without interpolation between points.
         """
         best = self._allowed(max_false_alarms_per_minute)
         rate = self.scores.false_alarms_per_minute[best]
@@ -75,19 +75,19 @@ class ThresholdCurve:
         return np.asarray(share @ np.isfinite(self.scores.latency_s[best]))
 
     def _allowed(self, max_false_alarms_per_minute: float) -> IntArray:
-        """Return the rows of at most so many false alarms per minute, the best operating point first."""
+        """Return the indices of thresholds within this bound of false alarms per minute, best first."""
         rate = self.scores.false_alarms_per_minute
         if np.any(np.isnan(rate)) or self.scores.latency_s.shape[-1] == 0:
             raise DataError(
-                "No operating point can be chosen: there is no event, or no second to count false alarms on.",
-                hint="Give recordings with both, or another time base of the policy.",
+                "No operating point can be chosen: there is no event, or no time in which to count false alarms.",
+                hint="Add recordings with events and of disturbances, or change `false_alarm_time` of the policy.",
             )
         order = np.lexsort((self.threshold, self.scores.f1, self.scores.recall))[::-1]
         return np.asarray(order[rate[order] <= max_false_alarms_per_minute])
 
 
 def threshold_curve(recordings: Sequence[ScoredRecording], policy: AlarmPolicy) -> ThresholdCurve:
-    """Return the scores of all recordings together at every threshold, exactly."""
+    """Return the scores over all recordings together, at every threshold at which an alarm changes."""
     pieces = [_of_one(recording, policy) for recording in recordings]
     threshold = np.unique(np.concatenate([[np.inf], *(piece.threshold for piece in pieces)]))
     rows = [piece.at(threshold) for piece in pieces]
@@ -102,7 +102,7 @@ def threshold_curve(recordings: Sequence[ScoredRecording], policy: AlarmPolicy) 
 
 
 def _of_one(recording: ScoredRecording, policy: AlarmPolicy) -> ThresholdCurve:
-    """Return the curve of one recording: alarms change at values of its score alone, and not at each of them."""
+    """Return the curve of one recording, at those values of its score at which alarms change."""
     found = [(np.inf, np.zeros(0, dtype=np.int64))]
     for threshold in np.unique(recording.score[~np.isnan(recording.score)])[::-1]:
         raised = alarms(recording.t_ns, recording.score >= threshold, policy)

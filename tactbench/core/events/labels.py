@@ -1,4 +1,4 @@
-"""Labels of a contact that sticks, slips in part or as a whole: from displacement and forces, never from the sensor."""
+"""Slip labels (stick, incipient, gross slip) from displacement and forces of the reference, not from the sensor."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import SlipThresholds, nanoseconds
 
 UNDECIDED, STICK, INCIPIENT, GROSS = -1, 0, 1, 2
-"""States of a frame. Undecided frames have no contact, or displacement and forces contradict each other."""
+"""Slip states of a frame; a frame is undecided without contact, or if displacement and forces contradict each other."""
 
 
 @dataclass(frozen=True)
 class SlipLabels:
-    """The labels of one recording by its reference."""
+    """Slip labels of one recording, from its reference sensors."""
 
     state: IntArray
     """(n,) :data:`STICK`, :data:`INCIPIENT`, :data:`GROSS` or :data:`UNDECIDED` of each sample of the reference."""
     gross_ns: IntArray
-    """(e, 2) onset and end of each gross slip that a hold in contact precedes [ns]."""
+    """(e, 2) onset and end [ns] of each gross slip that follows a hold in contact: the events."""
 
 
 def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
-    """Return c/a, the radius that sticks over the contact's: ``(1 - Q/(mu P))^(1/3)``.
+    """Return (n,) c/a, the radius of the sticking area over that of the contact: ``(1 - |Q|/(mu P))^(1/3)``.
 
-    Q is the tangential force, of either sign, P the normal one, and mu the static coefficient of friction, known or
+    Q is the tangential force [N], P the normal force [N], and mu the static coefficient of friction, known or
     measured on the reference.
 
     Notes
     -----
     Cattaneo 1938 and Mindlin 1949 (Johnson 1985, Contact Mechanics, eq. 7.39): two spheres, alike or incompressible,
-    Q growing from zero at constant P. Zero where Q is mu P or more; NaN without normal force. After unloading and for
-    other shapes it is a measure of the force ratio, not a radius.
+    Q growing from zero at constant P. The result is zero if Q is mu P or more, and NaN without normal force. After
+    unloading, or for other shapes, it measures the ratio of forces, not of radii.
     """
     share = np.full(normal_n.shape, np.nan)
     np.divide(np.abs(tangential_n), friction * normal_n, out=share, where=normal_n > 0)
@@ -50,7 +50,7 @@ def slip_labels(
     friction: float,
     thresholds: SlipThresholds,
 ) -> SlipLabels:
-    """Label one recording by its reference: the definitions stand in docs/events.md.
+    """Label the samples of one recording's reference as stick, incipient or gross slip; docs/events.md defines these.
 
     Parameters
     ----------
@@ -58,25 +58,25 @@ def slip_labels(
         (n,) times of the reference, strictly rising [ns].
     displacement_m
         (n,) displacement of the surface relative to the skin, along the motion [m]. An encoder between surface and
-        fixture also counts the way that the skin follows.
+        fixture also includes the displacement of a skin that moves along.
     tangential_n, normal_n, friction
-        See :func:`stick_ratio`.
+        (n,) forces [N], and coefficient of friction; see :func:`stick_ratio`.
     thresholds
-        Where the states part.
+        Limits between the states.
 
     Notes
     -----
-    Labels look ahead, unlike detectors: a hold is known when it is over. Gross slip is displacement that is no rest,
-    whatever the forces say. A contact at rest whose forces say gross is undecided: it has just let go, or mu is too
-    low. A slip that the recording begins with has no onset and is no event, though its frames are gross.
+    Labels use later samples, unlike detectors: a hold is known when it is over. In contact, all samples outside a hold
+    are gross slip, for any forces. A contact in a hold whose forces indicate gross slip is undecided: slip begins, or
+    mu is too low. A slip at the start of the recording has no onset and is not an event, though its samples are gross.
     """
     if np.any(np.diff(t_ns) <= 0):
-        raise DataError("Times of the reference do not rise strictly.", hint="Sort them, or cut where the clock stops.")
+        raise DataError("Times of the reference do not rise strictly.", hint="Sort rows, or cut where the clock stops.")
     rest = at_rest(t_ns, displacement_m, thresholds)
     if not rest.any():
         raise DataError(
             f"The surface never rests within {thresholds.gross_displacement_m:g} m for {thresholds.hold_s:g} s.",
-            hint="Slip is displacement after a hold: record one, or state a shorter one.",
+            hint="Slip is displacement after a hold: record such a hold, or set a shorter `hold_s` in the thresholds.",
         )
     contact = normal_n >= thresholds.contact_force_n
     ratio = np.where(contact, stick_ratio(tangential_n, normal_n, friction), np.nan)
@@ -91,13 +91,13 @@ def slip_labels(
 
 
 def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThresholds) -> npt.NDArray[np.bool_]:
-    """Return (n,) whether a sample lies in a hold.
+    """Return an (n,) mask, True for samples within a hold of the surface.
 
     Notes
     -----
-    A hold begins at the first sample from which on no two displacements of `hold_s` differ by more than
-    `gross_displacement_m`. It ends before the first later sample where two of the last `hold_s` do: that sample is the
-    onset, even if another hold begins there, as after a slip that is shorter than a sample.
+    A hold begins at a sample if no two displacements in the `hold_s` seconds from there differ by more than
+    `gross_displacement_m`. It ends before the first later sample for which two displacements in the last `hold_s` do
+    so: the onset, even if another hold begins there, as after a slip that is shorter than a sample.
     """
     n, hold = t_ns.size, nanoseconds(thresholds.hold_s)
     rest = np.zeros(n, dtype=np.bool_)
@@ -117,19 +117,19 @@ def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThreshol
 
 
 def spread(values: FloatArray, first: IntArray, end: IntArray) -> FloatArray:
-    """Return (k, …) largest less smallest of each ``values[first:end]``; 0 where that is empty."""
+    """Return the (k, …) ranges, largest minus smallest value, of each ``values[first:end]``; 0 for an empty slice."""
     least, largest = extremes(values, first, end)
     return np.asarray(largest - least)
 
 
 def extremes(values: FloatArray, first: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return (k, …) smallest and largest of each ``values[first:end]``; the value at `first` where that is empty."""
+    """Return the (k, …) smallest and largest of each ``values[first:end]``; the value at `first` for an empty slice."""
     pairs = np.column_stack([first, end]).ravel()
     padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
     return np.minimum.reduceat(padded, pairs)[::2], np.maximum.reduceat(padded, pairs)[::2]
 
 
 def _stretches(mask: npt.NDArray[np.bool_]) -> IntArray:
-    """Return (k, 2) first and last place of each run of True."""
+    """Return the (k, 2) indices of the first and last element of each run of True in a mask."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int64))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1])

@@ -1,1 +1,1 @@
-"""Statistics of scores: replicates, intervals of differences, ranks. See docs/statistics.md."""
+"""Statistics of scores: medians over replicates, intervals of differences and ranks; see docs/statistics.md."""

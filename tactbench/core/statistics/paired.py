@@ -1,7 +1,7 @@
-"""Two cells compared: the difference of their scores, how sure it is, and whether it matters.
+"""Compare two cells: the difference of their scores, its interval and p-value, and a verdict.
 
-Over replicates (:func:`difference`), or over folds whose training data overlap (:func:`over_folds`); several
-comparisons at once are corrected for being several (:func:`holm`).
+The comparison is over replicates (:func:`difference`), or over folds whose training data overlap (:func:`over_folds`);
+p-values of several comparisons are corrected by :func:`holm`.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ from tactbench.core.statistics.replicates import FEWEST, counted
 Row = Mapping[str, Any]
 Verdict = Literal["better", "worse", "equivalent", "undecided"]
 EXACT = 12
-"""Up to so many replicates, all ways of exchanging the two are tried."""
+"""Largest number of replicates for which all 2^n exchanges of the two cells' answers are computed."""
 EXCHANGES = 9_999
-"""Ways tried of more."""
+"""Number of random exchanges computed for more replicates than `EXACT`."""
 SEED = 0x7AC7
-"""Of these ways: the same rows have the same p-value, on any machine."""
+"""Seed of the random exchanges, so that the same rows have the same p-value on any machine."""
 
 
 @dataclass(frozen=True)
 class PairableRows:
-    """Rows that were tested on the same replicates, and so can be paired."""
+    """Result rows that were tested on the same replicates, so that their scores can be compared in pairs."""
 
     places: IntArray
-    """(n,) which of the rows given"""
+    """(n,) indices of these rows in the sequence given to :func:`together`."""
     names: tuple[str, ...]
     strata: IntArray
-    """(replicates,) which replicates may stand in for each other"""
+    """(replicates,) stratum index of each replicate."""
     influence: FloatArray
-    """(n, replicates): a score's squared standard error is the sum of their squares, the covariance of two scores that
-    of their products"""
+    """(n, replicates) influence of each replicate on each score; over replicates, squares sum to a score's squared
+    standard error, and products to the covariance of two scores."""
     freedom: float
-    """degrees of freedom of the standard errors"""
+    """Degrees of freedom of the standard errors."""
 
 
 def together(rows: Sequence[Row]) -> list[PairableRows]:
-    """Return finished rows of one metric in groups of equal replicates; rows without usable ones are in none.
+    """Return groups of finished rows with the same replicates; rows without usable replicates are left out.
 
-    The influence of a replicate is the change of the score without it (:func:`influences`).
+    The influence of a replicate on a score is computed by leaving that replicate out (:func:`influences`).
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
@@ -77,52 +77,52 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
 
 
 def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
-    """Return (replicates,) scores that a row keeps of its replicates: of `metric`, or beyond the floor."""
+    """Return the (replicates,) scores stored in a row's replicates; for ``excess_square``, those beyond the floor."""
     return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One cell's score less another's, in the metric's unit."""
+    """The first cell's score minus the second cell's, in the metric's unit, with interval and tests."""
 
     value: float
     low: float | None
     high: float | None
-    """95 % interval; None: nothing can be resampled"""
+    """Upper end of the 95 % interval from `low`; both None with too few replicates."""
     p: float | None
-    """two-sided, of no difference"""
+    """Two-sided p-value of no difference."""
     smallest_p: float | None
-    """the least that so few replicates can give"""
+    """Smallest p-value that is possible with this number of replicates."""
     effect: float | None
-    """difference over the standard deviation of the replicates' differences"""
+    """Difference over the standard deviation of the replicates' differences."""
     improved: float | None
-    """share of replicates (not paired: of pairs of them) on which the first is better, ties half; None where the metric
-    of one replicate is undefined"""
+    """Share of replicates (if not paired, of pairs of replicates) on which the first cell is better, ties counting
+    half; None if the metric is undefined on a replicate."""
     verdict: Verdict
-    """of the first cell"""
+    """Verdict on the first cell, relative to the second."""
     beyond: bool
-    """the whole interval is beyond the region of practical equivalence"""
+    """True if the whole interval is outside the region of practical equivalence."""
     replicates: int
-    """how many both have, where they are paired; else the fewer of the two"""
+    """Number of common replicates if they are paired; else the smaller number of the two cells."""
     unit: str
     paired: bool
     method: str
 
 
 def difference(first: Row, second: Row) -> Difference:
-    """Compare two finished rows of one metric.
+    """Compare the scores of two finished rows with the same metric.
 
     Notes
     -----
-    Where both were tested on replicates of the same names, differences are taken replicate by replicate, by the
-    jackknife's standard error (Efron and Stein 1981; Cameron, Gelbach and Miller 2008 on t with few clusters). The
-    p-value is that of exchanging the two answers within replicates: all 2^n ways up to 12 replicates, else 9,999 drawn
-    (Phipson and Smyth 2010 on counting the observed one). Where each replicate has a score of its own, the difference
-    is that of the means over replicates; of errors of force that have a floor, of the errors beyond it. Where the
-    replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
+    If both cells were tested on replicates of the same names, the comparison is paired, with the jackknife's standard
+    error (Efron and Stein 1981; Cameron, Gelbach and Miller 2008 on t with few clusters). The p-value is that of
+    exchanging the two cells' answers within replicates: all 2^n exchanges up to 12 replicates, else 9,999 random ones
+    (Phipson and Smyth 2010 on counting the observed one). If each replicate has a score of its own, the means over
+    replicates are compared; for errors of force with a noise floor, means of the errors beyond the floor. If the
+    replicates differ, the errors of the two scores are taken as independent, with the smaller degrees of freedom.
 
-    The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
-    equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
+    The verdict is *equivalent* if the interval is within the task's region of practical equivalence; otherwise *better*
+    or *worse* if the interval does not contain 0, else *undecided*. Ranks follow the same rule.
     """
     sign = -1.0 if lower_is_better(first["metric"]) else 1.0
     first, second = _means(first, second)
@@ -134,9 +134,9 @@ def difference(first: Row, second: Row) -> Difference:
 
 
 def _means(first: Row, second: Row) -> tuple[Row, Row]:
-    """Return rows whose replicates have scores of their own with the mean in place of the median.
+    """Return two rows with the mean over replicates as score, in place of the median, if replicates have scores.
 
-    Errors of force are those beyond the floor of the reference, if both rows have them.
+    For errors of force, the mean is of the errors beyond the reference's noise floor, if both rows have such errors.
     """
     kept = [row.get("replicates") or {} for row in (first, second)]
     if not all("scores" in one for one in kept):
@@ -193,7 +193,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
         replicates=min(len(one.names), len(other.names)),
         unit=unit,
         paired=False,
-        method=f"not paired (they have other replicates), {method}",
+        method=f"not paired (the replicates differ), {method}",
     )  # fmt: skip
 
 
@@ -211,7 +211,7 @@ def _difference(first: Row, value: float, deviation: float, freedom: float, **mo
 
 
 def _own_scores(row: Row) -> FloatArray:
-    """Return (replicates,) the score of each replicate by itself; NaN where the metric of it is undefined."""
+    """Return the (replicates,) scores of a row's single replicates; NaN for a replicate with an undefined metric."""
     kept, n_classes = row["replicates"], len(row["classes"])
     if "scores" in kept:
         return scores_of(kept, row["metric"])
@@ -220,12 +220,12 @@ def _own_scores(row: Row) -> FloatArray:
 
 
 def _share_better(apart: FloatArray) -> float | None:
-    """Return the share of differences above 0, of those that are 0 half; None where one is not finite."""
+    """Return the share of differences above 0, with zeros counted half; None if a difference is not finite."""
     return float(np.mean((np.sign(apart) + 1) / 2)) if np.isfinite(apart).all() else None
 
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
-    """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
+    """Return the p-value of exchanging two rows' answers within common replicates, and the smallest possible one."""
     name = first["metric"]
     if "scores" in first["replicates"]:
         apart_each = scores_of(first["replicates"], name) - scores_of(second["replicates"], name)
@@ -240,7 +240,7 @@ def exchanged(first: Row, second: Row) -> tuple[float, float]:
 
 
 def _ways(n: int) -> tuple[IntArray, float]:
-    """Return (ways, n) which of n replicates are exchanged, at first none, and the least p that so many ways give."""
+    """Return (exchanges, n) ones for replicates to exchange (first row: none), and the smallest possible p-value."""
     if n <= EXACT:
         return (np.arange(2**n)[:, None] >> np.arange(n)) & 1, 2.0 / 2**n
     drawn = np.random.default_rng(SEED).integers(0, 2, size=(EXCHANGES, n))
@@ -249,14 +249,14 @@ def _ways(n: int) -> tuple[IntArray, float]:
 
 
 def _share(apart: FloatArray) -> float:
-    """Return the share of ways whose difference is at least that of the first."""
+    """Return the share of exchanges whose absolute difference is at least that of the first, without exchange."""
     apart = np.abs(apart[np.isfinite(apart)])
     return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15))
 
 
 @dataclass(frozen=True)
 class FoldDifference:
-    """The mean difference over folds, with its interval and p-value."""
+    """The mean difference of two cells' scores over folds, with its 95 % interval and p-value."""
 
     mean: float
     low: float
@@ -266,14 +266,14 @@ class FoldDifference:
 
 
 def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDifference | None:
-    """Return the corrected resampled t-test of differences over folds; None of fewer than two.
+    """Return the corrected resampled t-test of differences over folds; None for fewer than two folds.
 
-    `test_over_train` is test rows over training rows of a fold; of unequal folds, the mean.
+    `test_over_train` is the number of test rows over that of training rows, as a mean over folds.
 
     Notes
     -----
-    ``t = d̄ / sqrt((1/n + n_test/n_train) s²)`` with n - 1 degrees of freedom. The second term stands for the
-    correlation of folds that train on mostly the same rows; without it the test finds differences that are not there
+    ``t = d̄ / sqrt((1/n + n_test/n_train) s²)`` with n - 1 degrees of freedom. The second term allows for the
+    correlation of folds that train on mostly the same rows; without it the test would too often find a difference
     (Nadeau and Bengio 2003, Inference for the generalization error).
     """
     d = np.asarray(differences, dtype=np.float64)
@@ -289,9 +289,9 @@ def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDif
 
 
 def over_folds(first: Row, second: Row) -> FoldDifference | None:
-    """Return the corrected test of two cells over the folds that both have; None where those hold out other units.
+    """Return the corrected t-test of two cells over their common folds; None for fewer than two common folds.
 
-    None also of errors against the true force: scores of folds are against the reference.
+    Return None also if the replicates differ, or for errors against the true force, which folds do not have.
     """
     if (
         first["metric"].startswith(TRUE)
@@ -307,13 +307,13 @@ def over_folds(first: Row, second: Row) -> FoldDifference | None:
 
 
 def holm(p: Sequence[float | None]) -> list[float | None]:
-    """Return p-values corrected for being several; None, of a comparison that could not be made, does not count.
+    """Return p-values corrected for multiple comparisons; None, for a comparison without p-value, stays None.
 
     Notes
     -----
-    Holm 1979, A simple sequentially rejective multiple test procedure: the k-th smallest of m is multiplied by
-    m - k + 1, never below that of a smaller one, never above 1. It controls the probability of any false finding
-    whatever the dependence between the comparisons.
+    Holm 1979, A simple sequentially rejective multiple test procedure: the k-th smallest of m p-values is multiplied
+    by m - k + 1, limited to 1, and raised to the corrected value before it if smaller. This controls the probability
+    of any false finding, for any dependence between the comparisons.
     """
     made = sorted((value, place) for place, value in enumerate(p) if value is not None)
     corrected: list[float | None] = [None] * len(p)

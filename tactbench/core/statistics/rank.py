@@ -1,4 +1,4 @@
-"""Ranks as tables show them; their computation, in `ranking`, loads numerics."""
+"""Ranks of cells as shown in tables; module `ranking`, which imports numpy, computes them."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Rank:
-    """A place, and the places that the data do not exclude."""
+    """The rank of a cell, and the range of ranks that the data do not exclude."""
 
     place: int
     low: int | None
-    """best place that the 95 % interval holds; None without an interval"""
+    """Best rank within the 95 % interval; None without an interval."""
     high: int | None
-    """worst place that it holds"""
+    """Worst rank within the 95 % interval; None without an interval."""
     tied: bool
-    """another cell has the same place"""
+    """True if another cell has the same rank."""
     behind: bool = False
-    """clearly worse than the cell with the best score"""
+    """True if the cell is clearly worse than the cell with the best score."""
 
     @property
     def unsure(self) -> bool:
-        """Whether it shares its place, or might have another."""
+        """True if another cell has the same rank, or the interval contains other ranks."""
         return self.tied or (self.low is not None and self.low != self.high)
 
 
 def beyond_floor(rows: Sequence[Row]) -> bool:
-    """Return whether rows are ranked by their errors beyond the floor: all have one."""
+    """Return True if rows are ranked by errors beyond the reference's noise floor: all have a RMSE and a floor."""
     return all(row["metric"] == "rmse" and row.get("reference_floor") is not None for row in rows)
 
 
 def excess_of(row: Row) -> float:
-    """Return a RMSE's mean square beyond the floor of its reference; of several replicates the median."""
+    """Return the mean squared error minus the squared noise floor of the reference; the median over replicates."""
     kept = row.get("replicates") or {}
     if "excess" in kept:
         return float(median(kept["excess"]))

@@ -1,4 +1,4 @@
-"""Ranks that may be believed: ties share one, and each has an interval."""
+"""Ranks of cells with 95 % intervals, where cells that are not clearly different share a rank."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ Row = Mapping[str, Any]
 
 
 def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
-    """Return the rank of each finished cell that is no baseline, by its name.
+    """Return the rank of each finished cell, except baselines, by the cell's name.
 
     Parameters
     ----------
     rows
-        Rows of one block: of the same task, protocol, split and hardware.
+        Rows to rank with each other: of the same task, protocol, split and hardware.
 
     Notes
     -----
-    A cell is *clearly better* than another if its score is, and the interval of their difference neither contains 0 nor
-    lies within the task's region of practical equivalence. Cells in order of their scores share a place until one comes
-    that all of those sharing it are clearly better than: it takes the place of its number in that order.
+    A cell is *clearly better* than another if its score is better, and the interval of their difference neither
+    contains 0 nor lies within the task's region of practical equivalence. In order of scores, cells share a rank until
+    a cell is clearly worse than all cells that share it; the rank of that cell is its position in the order.
 
-    `low` and `high` are the ranks that no comparison of two excludes, the shared place among them: 1 + the number of
-    cells that are clearly better, and the number of cells that are not clearly worse, itself among them (Mogstad,
-    Romano, Shaikh and Wilhelm 2024, Inference for ranks, at the level of a single pair).
+    `low` and `high` are the best and worst ranks that pairwise comparisons do not exclude, extended to the shared rank:
+    1 + the number of clearly better cells, and the number of cells, this one included, that are not clearly worse
+    (Mogstad, Romano, Shaikh and Wilhelm 2024, Inference for ranks, at the level of a single pair).
 
-    Errors of force are ranked by ``score² - floor²``, if all have a floor; the region of practical equivalence is that
-    of the roots: ``b² … (b + region)²`` for the better one's b.
+    Errors of force are ranked by ``score² - floor²``, if all have a noise floor; the region of practical equivalence
+    then applies to the roots: ``b² … (b + region)²`` for the better cell's root b.
 
-    Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
-    as independent; their interval is Student's, of two degrees of freedom the smaller. Where each replicate has a score
-    of its own, the better median must agree with it. A row without replicates is separated from none.
+    Differences are paired if two cells have the same replicates (:func:`together`); otherwise the errors of their
+    scores are taken as independent. The interval is Student's, with the smaller degrees of freedom. If each replicate
+    has a score of its own, mean and median must agree on the better cell. A row without replicates is never clear.
     """
     entered = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
     if not entered:
@@ -66,7 +66,7 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 def _clearly(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[npt.NDArray[np.bool_], IntArray]:
-    """Return (n, n) whether a cell is clearly worse than another, and (n,) places, in order of errors."""
+    """Return an (n, n) mask, True if cell i is clearly worse than cell j, and (n,) ranks, in order of errors."""
     n = len(rows)
     mean, deviation, freedom = _differed(rows, groups, error)
     distinct, which = np.unique(freedom, return_inverse=True)
@@ -95,9 +95,9 @@ def _clearly(
 def _differed(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (n,) numbers whose differences are tested, their standard errors and degrees of freedom.
+    """Return (n,) errors whose differences are tested, with their standard errors and degrees of freedom.
 
-    That is `error`, or the mean over replicates with scores of their own; a row without replicates has infinite ones.
+    These are `error`, or means over replicates that have scores; rows without replicates get infinite standard errors.
     """
     mean, deviation, freedom = error.copy(), np.full(len(rows), np.inf), np.full(len(rows), np.inf)
     metric = rows[0]["metric"]

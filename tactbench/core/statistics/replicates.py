@@ -1,4 +1,4 @@
-"""One row for each cell, in place of a row for each replicate."""
+"""Combine the rows of a cell's replicates (such as repeated campaigns) into one row for the cell."""
 
 from __future__ import annotations
 
@@ -18,50 +18,50 @@ _group = itemgetter("sensor", "task", "rig", "protocol", "split")
 _ranked_together = itemgetter("task", "protocol", "split", "simulated")
 
 FEWEST = 5
-"""Replicates that an interval or a rank needs: the range of four holds the median in 87.5 % of cases only."""
+"""Smallest number of replicates for an interval or a rank: the range of four covers the median in only 87.5 %."""
 LEVEL = 0.95
 _MEDIANS = (
     "score", "reference_score", "reference_floor", "reference_floor_se", "score_beyond_floor", "true_score",
     "sim_s", "search_s", "fit_s", "predict_s",
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
-"""Numbers of a row whose median over replicates stands in the table."""
+"""Keys of numbers that are replaced by their median over replicates."""
 _INTERVALS = {
     "score": "",
     "score_beyond_floor": "beyond_floor_",
     "true_score": "true_",
     "reference_score": "reference_",
 }
-"""Numbers with an interval, and how its keys begin."""
+"""Keys of numbers with an interval, and the prefix of the interval's keys."""
 
 
 def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row for each cell, without the seed of the replicate in its name.
+    """Return one row for each cell, combined from the rows of its replicates and named without their seeds.
 
     Parameters
     ----------
     rows
-        One a cell and replicate, as a result folder holds them; rows that are of all replicates already stay as they
-        are.
+        One row for each cell and replicate, as in a result folder; rows that are already combined are returned
+        unchanged.
 
     Returns
     -------
     list of dict
-        In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
-        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and of a
-        single campaign whose split holds out five units, the replicates are what is held out, and the row's own
-        interval stays; of several seeds on the same recordings the one with the median score stands for all.
+        Rows in the order of the cells' first replicates. On a simulated rig `score` is the median over replicates, with
+        the interval of the median (:func:`median_interval`), None for fewer than five. On recordings, and for a single
+        campaign whose split holds out five units, the replicates are the units held out, and the row's own interval is
+        kept; of several seeds on the same recordings, the row with the median score is returned.
         Times are medians over the runs of one host. Recordings, answers and key are those of the first replicate.
 
     Notes
     -----
-    Keys that are added: `repeats` (replicates that ended, however), `n_replicates`, `replicate_unit`,
+    Keys that are added: `repeats` (number of replicates, with those that failed), `n_replicates`, `replicate_unit`,
     `replicate_scores`, `seeds`, `score_min` and `score_max` (the range of the replicates' scores). `recordings_right`
     and `recordings_asked` are means over replicates.
 
-    The score that ranks is decided here: where all rows that may stand in one table know the error
-    against the true force, `metric` is ``true_rmse`` and `score`, intervals and replicates are of that error; the error
-    against the reference is under `reference_score`. An error beyond the floor, which estimates the true one, is then
+    The score for ranking is decided here: if all rows that can be in the same table have an error against the true
+    force, `metric` is ``true_rmse``, and `score`, intervals and replicates are of that error; the error against the
+    reference is under `reference_score`. The error beyond the noise floor, an estimate of the true error, is then
     left out.
     """
     rows = _by_truth(rows)
@@ -94,7 +94,7 @@ def _true(row: Row) -> Row:
 
 
 def against_reference(row: Row) -> Row:
-    """Return a row whose score is against the reference as it was recorded, as published errors of force are."""
+    """Return a row with its score against the recorded reference, as in published errors, not the true force."""
     if row.get("reference_score") is None:
         return row
     return {
@@ -106,11 +106,11 @@ def against_reference(row: Row) -> Row:
 
 
 def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
-    """Write beside every row the best trivial score of its group that used no more than the row's own answer may.
+    """Set `baseline` in every row: the best score of its group's trivial estimators with no more input than the row's.
 
-    A trivial answer that looks at the time of a sample knows what an answer from readings does not: a ramp that is
-    commanded alike in every recording. It is compared with answers that look at the time too, and with no others. One
-    that looks at the reference is an oracle, and no bar to anything.
+    A trivial estimator that uses the time of a sample can learn the force ramp commanded in every recording, which
+    readings do not contain. It is a baseline only for estimators that use the time too. An estimator that uses the
+    reference (an oracle) is a baseline for none.
     """
     by_group: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -146,7 +146,7 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the row of a simulated cell: each replicate is a campaign recorded anew."""
+    """Return the combined row of a simulated cell, whose replicates are separately simulated campaigns."""
     first = done[0]
     if len(done) == 1 and first["ci_low"] is not None and "own" in (first.get("replicates") or {}):
         return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
@@ -185,7 +185,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the scores of each replicate, by which cells are compared."""
+    """Return the replicates of a simulated cell, with their scores, for comparisons between cells."""
     kept: dict[str, Any] = {
         "unit": "replicate",
         "names": [str(row["seed"]) for row in done],
@@ -199,9 +199,9 @@ def _kept(done: Sequence[Row]) -> dict[str, Any]:
 
 
 def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the row of a cell whose replicates are the units its split holds out; of several seeds the median one's.
+    """Return the row with the median score over seeds, for a cell whose replicates are the units held out by its split.
 
-    A row that does not keep their own scores has an interval over something else, and loses it.
+    The interval is removed from a row without scores of single units, since it is over something else.
     """
     middle = median_low([row["score"] for row in done])
     row = next(row for row in done if row["score"] == middle)
@@ -232,7 +232,7 @@ def _median(values: Sequence[Any]) -> float | None:
 
 
 def _chosen(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the values chosen on validation data: the lower median over replicates."""
+    """Return the lower medians, over replicates, of the parameters chosen on validation data."""
     names = dict.fromkeys(name for row in done for name in row["chosen"])
     return {name: median_low([row["chosen"][name] for row in done if name in row["chosen"]]) for name in names}
 
@@ -243,37 +243,37 @@ def _middle(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _added(tables: Sequence[Any]) -> Any:
-    """Return the sum of confusion matrices; that of the first where they are of different classes."""
+    """Return the sum of confusion matrices; only the first matrix if their numbers of classes differ."""
     if any(table is None or len(table) != len(tables[0]) for table in tables):
         return tables[0]
     return [[sum(counts) for counts in zip(*lines, strict=True)] for lines in zip(*tables, strict=True)]
 
 
 def _texts(done: Sequence[Row], key: str) -> list[str]:
-    """Return the texts that rows have under a key, those of a part of the replicates with their number."""
+    """Return the texts under `key` in any row, with the number of replicates if not all rows have the text."""
     counts = Counter(text for row in done for text in dict.fromkeys(row.get(key) or ()))
     return [text if n == len(done) else f"in {n} of {len(done)} replicates: {text}" for text, n in counts.items()]
 
 
 @dataclass(frozen=True)
 class MedianInterval:
-    """Where a median may lie."""
+    """Confidence interval of a median."""
 
     low: float
     high: float
     level: float
-    """Coverage: 0.95, or that of the whole range where five replicates reach no more."""
+    """Coverage of the interval: 0.95, or 0.9375, that of the whole range, for five replicates."""
 
 
 def median_interval(values: Sequence[Any]) -> MedianInterval | None:
-    """Return the 95 % interval of the median of what `values` were drawn from; None of fewer than five.
+    """Return the 95 % interval of the median of the distribution of `values`; None for fewer than five values.
 
     Notes
     -----
-    The interval between the k-th smallest and the k-th largest of n values holds the median with probability
-    ``1 - 2 P(B < k)``, B binomial with n and 1/2, whatever the distribution is. Between the two k whose probabilities
-    enclose 95 % the ends are interpolated [1]_: 95 % are covered of smooth distributions, of any continuous one no less
-    than :func:`least_coverage`. The range of five values holds it in 93.75 % only, which is its level.
+    The interval from the k-th smallest to the k-th largest of n values covers the median with probability
+    ``1 - 2 P(B < k)``, B binomial with n and 1/2, for any continuous distribution. The ends are interpolated between
+    the two k whose probabilities enclose 95 % [1]_: the coverage is 95 % for smooth distributions, and for others at
+    least :func:`least_coverage`. The range of five values covers the median in only 93.75 %, which is then the level.
 
     References
     ----------
@@ -296,7 +296,7 @@ def median_interval(values: Sequence[Any]) -> MedianInterval | None:
 
 
 def least_coverage(n: int) -> float:
-    """Return the least coverage of the interval of a median of `n` values, five or more, over all distributions."""
+    """Return the least coverage, over all distributions, of the median's interval from `n` values, n at least 5."""
     return _coverage(n, 1) if n == FEWEST else _coverage(n, _depth(n) + 1)
 
 
@@ -306,18 +306,18 @@ def _depth(n: int) -> int:
 
 
 def counted(n: int, unit: str) -> str:
-    """Return so many of a unit of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
+    """Return a number of units of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
     return f"{n} {unit if n == 1 else plural(unit)}"
 
 
 def count_range(counts: Sequence[int], unit: str) -> str:
-    """Return how many of a unit there are, from the fewest to the most: ``5 to 8 sessions``."""
+    """Return the range of several numbers of units as text: ``5 to 8 sessions``."""
     least, most = min(counts), max(counts)
     return counted(most, unit) if least == most else f"{least} to {counted(most, unit)}"
 
 
 def percent(n: int | None, unit: str | None) -> str:
-    """Return the coverage of intervals over `n` replicates, or sessions, as text: ``95 %``."""
+    """Return the coverage of an interval over `n` units (replicates, sessions …) as text: ``95 %``."""
     return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"
 
 

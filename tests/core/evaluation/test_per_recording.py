@@ -156,7 +156,7 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
     both = task(features_by=f"{HERE}:crest_factor")
     names = summarised(load_dataset(both, paths), both, protocol_called("deployable")).features
     assert (len(names), names[4:]) == (6, ("crest", "spread"))
-    for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
+    for name, words in (("other_names", "other features"), ("not_a_number", "only finite numbers")):
         with pytest.raises(PluginContractError, match=words):
             run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
 
