@@ -19,7 +19,7 @@ class Wrapped:
         self.model = model
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         return np.asarray(self.model.predict(X))
 
 
@@ -42,7 +42,7 @@ class Forest(Wrapped):
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         if self.threads == 1 or len(X) < 100 * self.threads:
             return super().predict(X)
         with ThreadPoolExecutor(self.threads) as pool:
@@ -92,7 +92,7 @@ class FastForest(Wrapped):
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         return super().predict(X).reshape(len(X))
 
 
@@ -169,7 +169,7 @@ class OfUnitSpread(Wrapped):
         return self
 
     def predict(self, X: FloatArray) -> FloatArray:
-        """Return (n,) answers to X (n, p), in the unit of y."""
+        """Return the (n,) predictions for the features X (n, p), in the unit of y."""
         answers: FloatArray = self.mean + self.spread * self.model.predict(X)
         return answers
 

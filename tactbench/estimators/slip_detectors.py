@@ -36,7 +36,7 @@ def never(*, kind: str, seed: int, threads: int) -> Any:
 
 
 class MeanFeature:
-    """The mean of a frame's features, each scaled by the training frames."""
+    """Detector whose score is the mean of a frame's features, each scaled by the training frames."""
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> MeanFeature:
         """Do nothing: only the threshold, chosen elsewhere, depends on the training data."""

@@ -22,18 +22,18 @@ _FEWEST_CELLS = 4
 
 @dataclass(frozen=True)
 class Contact:
-    """Place and shape of the contact of an indenter."""
+    """Place, tilt and shape of an indenter on the skin."""
 
     radius_mm: float
-    """Radius of the cap; infinite for a flat surface and for another shape."""
+    """Radius of a spherical cap; infinite for a flat surface and any other shape."""
     x_mm: float
     """Position of the indenter's apex along the finger, in the sheet's coordinates."""
     s_mm: float
     """Position of the indenter's apex along the arc of the finger's surface."""
     tilt_x: float = 0.0
-    """Slope of the indenter along the finger [1]."""
+    """Slope [1], rise over run, of the tilted indenter along the finger."""
     tilt_s: float = 0.0
-    """Slope of the indenter across the finger [1]."""
+    """Slope [1], rise over run, of the tilted indenter across the finger."""
     shape: Shape | None = None
     """Shape of an indenter that is neither flat nor a cap."""
 

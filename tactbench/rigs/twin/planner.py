@@ -41,7 +41,7 @@ class Plan:
     entries: tuple[PlanEntry, ...]
     """Included effects in the order of application, followed by the effects left out."""
     stages: tuple[EffectDescriptor, ...]
-    """Effects to apply, in order."""
+    """Descriptors of the effects to apply, in order."""
     lent: Mapping[str, str]
     """Effects that the contact solver may apply: name -> ``module:callable``."""
 
@@ -140,7 +140,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
     if not kinds:
         raise NotApplicable(
-            f"needs a channel of kind {' or '.join(scene.observe) or '(none named)'}; {sensor.name} has "
+            f"needs a channel of kind {' or '.join(scene.observe) or '(no kind named)'}; {sensor.name} has "
             f"{', '.join(sorted(present))}."
         )
     return kinds

@@ -69,12 +69,12 @@ class TwinAcquisition:
         return 1e-3 * (depths_mm - depths_mm[0]), forces_n
 
     def __iter__(self) -> Iterator[Block]:
-        """Return one block of each stream."""
+        """Return an iterator over the blocks of samples, one block for each stream."""
         return iter(self.samples.values())
 
 
 class Twin:
-    """The simulated rig, with all installed shapes of indenters.
+    """The simulated rig, with the given effects and all installed shapes of indenters.
 
     `effects` are candidates for every scene: a plan includes those that the scene needs. `named_effects` are candidates
     only if the sensor or the scene names them.

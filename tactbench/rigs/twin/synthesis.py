@@ -62,15 +62,15 @@ class Tangential(NamedTuple):
     force_n: FloatArray
     """Tangential force between surface and skin, as measured by a force sensor behind the surface."""
     displacement_mm: FloatArray
-    """Displacement of the skin under the contact relative to the core."""
+    """Tangential displacement of the skin under the contact relative to the core."""
     slip_mm_s: FloatArray
-    """Speed of the surface over the skin; 0 while they stick."""
+    """Speed of the surface relative to the skin under it; 0 while both stick together."""
     slip_mm: FloatArray
     """Distance that the surface has slipped over the skin."""
     slipping: npt.NDArray[np.bool_]
     """True while the whole contact slips."""
     stick_ratio: FloatArray
-    """Radius of the part that sticks over that of the contact, 0 to 1."""
+    """Radius of the sticking inner part of the contact divided by the contact's radius, 0 to 1."""
 
 
 class Settled(NamedTuple):
@@ -109,7 +109,7 @@ class Track:
     """(n,) kelvin by which the contact has warmed the core; None: no heat flows through it."""
 
     def by_kind(self) -> dict[ChannelKind, list[int]]:
-        """Return the columns of each kind of channel."""
+        """Return the column numbers of each kind of channel in `readings`."""
         columns: dict[ChannelKind, list[int]] = {}
         for column, channel in enumerate(self.channels):
             columns.setdefault(channel.kind, []).append(column)

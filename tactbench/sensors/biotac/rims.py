@@ -8,7 +8,7 @@ So cells belong to a disc by their centres, and the plane solution across a stra
 outside and ``(q / h) lambda exp(n.r / lambda)`` inside (up to ``lambda``'s own shift), is built into the
 conductances: a face across the rim, ``t`` of whose length is outside, conducts ``h w / (t + (lambda / n) (1 -
 exp(-(D - t) n / lambda)))``, and a cell inside beside the rim takes the current that makes this solution balance. Both
-tend to plain area weighting for thick films and to a fixed potential on the very rim for closed ones.
+tend to plain area weighting for thick films and to a fixed potential on the rim itself for closed films.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The rigid core under a fluid-backed skin, which carries load where the film is closed.
+"""Model of the rigid core under a fluid-backed skin, which carries load where the fluid film is closed.
 
 The core is added only when a load closes the film. Below that load the solutions with and without the core are the
 same.

@@ -13,7 +13,7 @@ from tactbench.rigs.twin.geometry import skin_grid
 CUT_OVER = 0.97
 """Share of the densification strain beyond which the law is continued by its tangent, to avoid a division by zero."""
 OUTSIDE_THE_PAD = 1e-2
-"""Stiffness of the margin around the pad, relative to the foam."""
+"""Stiffness of the sheet's margin outside the foam pad, relative to the stiffness of the foam."""
 
 
 CONTACT_UPDATES = 2
@@ -65,7 +65,7 @@ def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
 
 
 def _covered(centres: FloatArray, low: float, high: float) -> FloatArray:
-    """Return the share of each cell that lies between `low` and `high`."""
+    """Return the (n,) shares, 0 to 1, of cells with (n,) `centres` that lie between `low` and `high`."""
     step = float(centres[1] - centres[0])
     ends = np.minimum(centres + step / 2, high) - np.maximum(centres - step / 2, low)
     return np.asarray(np.clip(ends / step, 0.0, 1.0))

@@ -44,7 +44,7 @@ def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray,
 
     - under pressure, along the wave: ``C = [(1-2nu) (3-4nu) (cosh 2q - 1) - 2q²] / 2D``. A wave of pressure
       ``p cos kx`` moves the surface by ``-C p sin kx / (G k)``: towards the pressed place where C > 0. C is 0.5 - nu
-      for short waves (Boussinesq), ``-q²/2`` for long ones in an incompressible layer: what is squeezed out flows away;
+      for short waves (Boussinesq), ``-q²/2`` for long ones in an incompressible layer, whose material flows away;
     - under a traction along the wave: ``(1-nu) [(3-4nu) sinh 2q + 2q] / D``, 1 - nu for short waves;
     - under a traction along the crests: ``tanh q``, 1 for short waves.
 

@@ -66,11 +66,11 @@ class LoadTable:
     residual: float
     """Largest relative residual of the solutions at all nodes."""
     touch_down_n: tuple[float, float] | None
-    """Bracket of the load at which the skin touches the core; None if it never does."""
+    """Two loads [N] between which the skin first touches the core; None if it never touches the core."""
     error: FloatArray
     """(channels,) three times the largest difference of a solved reading from the interpolant through the others."""
     interpolant: Interpolant
-    """Depth, contact radius and fluid pressure against load, then the readings."""
+    """Interpolant over load [N] of depth, contact radius and fluid pressure, followed by the readings."""
 
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
@@ -164,7 +164,7 @@ def build_table(
 
 
 def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
-    """Return two loads [N] between which the skin touches the core, both of them nodes; None if it never does."""
+    """Return two nodes [N] between which the skin first touches the core; None if it never touches the core."""
     closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
     if not closed:
         return None

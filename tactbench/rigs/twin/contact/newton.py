@@ -40,12 +40,12 @@ _BALANCED = 1e-12
 
 @dataclass(frozen=True)
 class Solution:
-    """The skin under one load."""
+    """Solved state of the skin under one load."""
 
     vector: FloatArray
     """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
     deflection_mm: FloatArray
-    """(nx, ns)"""
+    """(nx, ns) deflection of the skin."""
     pressure_mpa: FloatArray
     """(nx, ns) contact pressure."""
     residual: float
@@ -53,7 +53,7 @@ class Solution:
 
     @property
     def depth_mm(self) -> float:
-        """Approach of the indenter, counted from where the gap is zero."""
+        """Approach of the indenter from its first touch of the unloaded skin."""
         return float(self.vector[-1])
 
 

@@ -28,14 +28,14 @@ class AnyPress(ABC):
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
 
     def closing_at(self, force_n: float) -> float:
-        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
         return -np.inf
 
     def state(
         self, force_n: float, deflection_mm: FloatArray, pressure_mpa: FloatArray,
         depth_mm: float, residual: float, fluid_pressure_mpa: float = 0.0,
     ) -> SkinState:  # fmt: skip
-        """Return the state of a solved contact."""
+        """Return the state of the skin for a solved contact."""
         r2 = (self.medium.grid.x_mm[:, None] - self.contact.x_mm) ** 2
         r2 = r2 + (self.medium.grid.s_mm[None, :] - self.contact.s_mm) ** 2
         return SkinState(
@@ -101,7 +101,7 @@ class Press(AnyPress):
         )  # fmt: skip
 
     def closing_at(self, force_n: float) -> float:
-        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
         if not self.medium.has_core:
             return -np.inf
         if force_n <= 0:

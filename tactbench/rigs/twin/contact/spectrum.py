@@ -26,16 +26,16 @@ class Spectrum:
         nx, ns = self.shape
         self.half = (nx, ns // 2 + 1)
         self.size = 2 * self.half[0] * self.half[1]
-        """Length of a flat vector."""
+        """Number of coefficients in a flat vector."""
         dx, ds = grid.cell_mm
         self.area_mm2 = dx * ds
         """Area of one cell of the grid."""
         kx = np.pi / (nx * dx) * np.arange(nx) if mirrored else 2 * np.pi * np.fft.fftfreq(nx, dx)
         ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
         self.kx = kx[:, None]
-        """(nx, 1) axial wave number, 1/mm."""
+        """(nx, 1) wave numbers of the modes along x, 1/mm."""
         self.k2 = self.kx**2 + ks**2
-        """(nx, ns//2+1) squared wave number, 1/mm²."""
+        """(nx, ns//2+1) squared wave numbers of the modes, 1/mm²."""
         # Columns between the first and the last stand for themselves and their conjugates.
         weight = np.full((1, self.half[1]), math.sqrt(2.0))
         weight[0, 0] = 1.0

@@ -1,4 +1,4 @@
-"""The effects of contact: pressing the skin, and reading the channels from it."""
+"""Effects by which the twin simulates contact: pressing the skin, and computing the channels from its state."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def forget_tables() -> None:
 
 
 def watch_fluid(run: Synthesis) -> None:
-    """Request the pressure of the fluid with every solved load."""
+    """Request that every solved load states the pressure of the fluid in the skin."""
     run.fluid_pressure = True
 
 
 def watch_shear(run: Synthesis) -> None:
-    """Request the tangential state of the skin with every solved load."""
+    """Request that every solved load states the tangential displacement and traction of the skin."""
     run.tangential = True
 
 

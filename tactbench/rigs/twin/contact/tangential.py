@@ -17,7 +17,7 @@ from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
 Direction = tuple[float, float]
-"""Unit vector along x and s."""
+"""Direction of a slide on the skin: the components of a unit vector along x and s."""
 
 
 class TangentialResponse:

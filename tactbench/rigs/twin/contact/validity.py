@@ -19,11 +19,11 @@ RESOLVED_CELLS = 3.0
 cap of 2 mm at eight places: against cells a quarter as wide, the depth is off by up to 23 % at 0.9 cells, 6 % at
 1.7, 2 % at 2.7 and 1.4 % at 3.4."""
 HELD_AGAINST_N = 5.0
-"""Largest load of the paper (Karl et al. 2016) and of the solver's reference values."""
+"""Largest load [N] in Karl et al. 2016 and in the reference values for the solver; larger ones get a remark."""
 INTO_THE_CORE = 0.1
 """Share of the film's thickness by which the skin may sink into the core, whose penalty spring is soft. Assumed."""
 AT_THE_EDGE = 0.01
-"""Share of the load outside the active skin above which there is a remark. Assumed."""
+"""Share of the load outside the active skin above which the recording gets a remark. Assumed."""
 
 
 def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:

@@ -1,4 +1,4 @@
-"""Creep: part of a channel's response follows the load with a delay."""
+"""Creep of the skin: a part of each channel's response follows the load with a delay."""
 
 from __future__ import annotations
 

@@ -16,14 +16,14 @@ from tactbench.rigs.twin.synthesis import Load, Synthesis
 BEYOND = 3.0
 """Multiple of the largest commanded force up to which the skin is solved; it limits the motor's travel."""
 RETRACT_MM = 1.0
-"""Travel limit away from the skin [assumed]; it bounds a loop that oscillates."""
+"""Largest travel [mm] of the motor away from the skin [assumed]; it bounds oscillations of the control loop."""
 _CURVE_POINTS = 4001
 """Number of depths at which the force is tabulated; linear interpolation between them is off by less than 1e-4 of the
 largest force (tested)."""
 
 
 def apply(run: Synthesis) -> None:
-    """Simulate the force loop over the recording and make its force the load.
+    """Simulate the motor's force control over the recording, and use the resulting force as the load.
 
     Unless its rate is stated, the loop reads the force once per recorded sample, with the same noise as the recorded
     force: both come from one sensor.

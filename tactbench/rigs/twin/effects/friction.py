@@ -1,4 +1,4 @@
-"""Friction between a sliding surface and the skin."""
+"""Effect of friction between a sliding surface and the skin."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class HeatedCore:
 
     @property
     def rise_k(self) -> float:
-        """Temperature of the warm core above that of the room, K."""
+        """Final temperature of the heated core above the room's temperature, K."""
         return self.power_w * self.resistance_k_per_w
 
     @property
@@ -105,10 +105,10 @@ def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatAr
 
 @dataclass(frozen=True)
 class Thermistor:
-    """``T = b / ln((p - q x)/x) - 273.15`` degC, with x the reading over full scale.
+    """A thermistor with ``T = b / ln((p - q x)/x) - 273.15`` degC, x being the reading over full scale.
 
-    The form in which the maker of the BioTac states it (SynTouch BioTac SP product manual, section 5): a thermistor
-    of exponent b in a divider.
+    The formula is that of the BioTac's maker (SynTouch BioTac SP product manual, section 5) for a thermistor of
+    exponent b in a voltage divider.
     """
 
     b_k: float

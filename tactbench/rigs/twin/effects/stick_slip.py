@@ -45,9 +45,9 @@ class Drive:
     stribeck_mm_s: float
     mode: Mode
     t_s: FloatArray
-    """(m,) grid, ascending, over the whole recording."""
+    """(m,) ascending times of the grid's nodes, over the whole recording."""
     load_n: FloatArray
-    """(m,) normal force."""
+    """(m,) normal force at the grid's nodes."""
     stiffness: FloatArray
     """(m,) tangential stiffness of the skin, N/mm; above 0 wherever the load is."""
 
@@ -200,7 +200,7 @@ class Dragged:
         self._x_mm.append(np.minimum.accumulate(held))
 
     def __call__(self, t_s: FloatArray) -> Tangential:
-        """Return the tangential state at (n,) moments."""
+        """Return the tangential state of the contact at (n,) times."""
         drive = self.drive
         phase = np.searchsorted(self._begin, t_s, side="right") - 1
         kind, begin, x0, about = self._kind[phase], self._begin[phase], self._from[phase], self._about[phase]
