@@ -52,7 +52,7 @@ def labels(radius_mm: float | None) -> dict[str, str | float | int]:
 
 
 def surface_name(radius_mm: float | None) -> str:
-    """Return a surface's name, fit for a file name."""
+    """Return the name of a surface, with characters allowed in a file name."""
     return FLAT if radius_mm is None else f"cap-{radius_mm:g}mm"
 
 

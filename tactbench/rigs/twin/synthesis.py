@@ -141,9 +141,9 @@ class Synthesis:
     reference_n: FloatArray
     """(n,) reading of the force sensor; equal to the true force until an effect changes it."""
     fluid_pressure: bool = False
-    """True if the pressure of the fluid is observed."""
+    """True if an observed channel needs the pressure of the fluid."""
     tangential: bool = False
-    """True if the tangential state of the skin is observed."""
+    """True if an observed channel needs the tangential state of the skin."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None

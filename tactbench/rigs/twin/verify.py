@@ -26,7 +26,7 @@ from tactbench.rigs.twin.rig import Twin, build
 
 RADIUS_MM = 10.0
 _TASK = "force"
-"""Task whose first scene is simulated for each sensor."""
+"""Name of the task whose first scene is simulated with each sensor."""
 
 
 def verdicts() -> Iterator[Verdict]:

@@ -73,7 +73,7 @@ def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
 
 
 def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
-    """Yield family, label and fidelity of every point to be measured."""
+    """Yield family, label and accuracy settings of every point of the diagram."""
     skin = sensor.spec.skin
     assert skin is not None
 

@@ -38,7 +38,7 @@ _ROUNDING_S = 1e-9
 """Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""
 
 _IDLE = b"\xff"
-"""Level of the line while the sensor does not drive it [assumed: high]."""
+"""Byte that the host reads while the sensor does not drive the data line [assumed: high]."""
 
 _FILLERS = (0x00, 0x01)
 """First bytes that a host may send while it reads a reply: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual,
@@ -65,9 +65,9 @@ class BioTacFault(Fault):
     }
 
     channels: frozenset[str] = frozenset()
-    """Affected channels; empty: all of them."""
+    """Names of the channels that have the fault; empty: all channels."""
     error: int = 0x2E
-    """Second byte of an error reply."""
+    """Second byte of the error reply that the fault causes."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -84,7 +84,7 @@ class BioTacFault(Fault):
 @dataclass
 class _Answer:
     data: bytes
-    """Bytes that the host receives."""
+    """Bytes that the host receives as the answer to a command."""
     word: bytes = b""
     """Word that a resend command repeats; empty if no word was sent."""
     channel: str = ""

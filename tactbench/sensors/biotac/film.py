@@ -25,7 +25,7 @@ def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Return the (n+1,) edges of cells of equal length."""
+    """Return the (n+1,) edges of cells of equal length with the (n,) `centres`."""
     half = float(centres[1] - centres[0]) / 2
     return np.concatenate([centres - half, centres[-1:] + half])
 

@@ -41,7 +41,7 @@ class Disc(NamedTuple):
     radius_mm: float
     """Radius in true lengths on the film."""
     stretch: tuple[float, float] = (1.0, 1.0)
-    """Local stretch of the film relative to the grid, along x and s."""
+    """Ratios of lengths on the film to lengths on the grid, along x and s, at the disc."""
 
 
 class RimmedDiscs:

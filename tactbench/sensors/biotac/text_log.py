@@ -126,7 +126,7 @@ def _frames(lines: Sequence[str], sensor: int, counts: Counter[str]) -> list[lis
 
 
 def _read(words: list[str], sensor: int) -> _Line | None:
-    """Return the parsed line, or None if it is not a sample."""
+    """Return the sample in a line's words for one sensor, or None if the line is not a sample."""
     pair = words[4 + 2 * sensor : 6 + 2 * sensor]
     if len(words) % 2 or len(pair) < 2:
         return None

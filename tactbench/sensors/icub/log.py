@@ -89,7 +89,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
 
 
 def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
-    """Return the one (board, triangle) of `there` that fits `wanted`."""
+    """Return the only (board, triangle) in `there` that fits the options `settings`."""
     fitting = [
         (board, triangle)
         for board, triangle in there

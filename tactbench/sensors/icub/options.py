@@ -25,7 +25,7 @@ class FingertipOptions(Options):
     """Skin type, see :class:`~tactbench.sensors.icub.codec.BoardSetup`; not 3, which numbers triangles differently,
     and not 7, which sends no readings."""
     period_ms: int = Field(default=20, ge=1, le=255)
-    """Milliseconds between samples."""
+    """Milliseconds between the samples that the board sends."""
     no_load: int = Field(default=240, ge=1, le=254)
     """Reading at rest, counts; with 0 or 255 the board would flag every taxel as out of range."""
     shift: int = Field(default=0, ge=0, le=7)

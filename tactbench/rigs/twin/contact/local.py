@@ -36,13 +36,13 @@ class LocalPress(AnyPress):
         if isinstance(skin, FluidBackedShell):
             raise RigError(
                 "The solver 'closed-form' cannot compute a skin over a fluid, whose volume must stay constant.",
-                hint="Choose the default contact solver.",
+                hint="Set the option rung to default.",
             )
         if isinstance(skin, BondedLayer) and skin.poisson.to("1") > LARGEST_POISSON:
             raise RigError(
                 f"The solver 'closed-form' cannot compute a layer with Poisson's ratio {skin.poisson.to('1'):g}: above "
                 f"{LARGEST_POISSON} its depth would be wrong by a fifth or more.",
-                hint="Choose the default contact solver.",
+                hint="Set the option rung to default.",
             )
         super().__init__(medium, contact)
         self._gap = gap_mm
@@ -74,7 +74,7 @@ class LocalPress(AnyPress):
         if residual > 1e-8:
             raise RigError(
                 f"The solver 'closed-form' misses the force {force_n:g} N by the relative error {residual:.1e}.",
-                hint="Choose the default contact solver, or check the skin's parameters.",
+                hint="Set the option rung to default, or check the skin's parameters.",
             )
         self._depth = depth
         return self.state(force_n, deflection, pressure, depth - self._least_gap, residual)

@@ -65,7 +65,7 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
             f"the contact is {cells:.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} it follows the mesh"
         )
     if force > HELD_AGAINST_N:
-        found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
+        found["remark load"] = f"{force:g} N is beyond {HELD_AGAINST_N:g} N, up to which the model was compared"
     found |= _too_deep(press.medium, press(force).deflection_mm)
     along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, sheet))
     along, across = along[pressure > 0], across[pressure > 0]
@@ -80,7 +80,7 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
             "steeper than 45 degrees"
         )
     if sheet.dome is not None and press.contact.x_mm > sheet.dome.start.to("mm"):
-        found["remark dome"] = "the contact is on the dome, where the model has been held against no real press"
+        found["remark dome"] = "the contact is on the dome, where the model was never compared with real presses"
     share = float(pressure[~_active(sheet, press.medium.grid)].sum() / pressure.sum())
     if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"

@@ -85,9 +85,9 @@ def shear(scene: Scene, sensor: SensorSpec) -> Reason:
         return _no(NO_LOAD)
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
-        return _no("no observed channel looks along the skin")
+        return _no("no observed channel responds to tangential motion of the skin")
     slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
-    return Reason(True, f"{' and '.join(looking)} channels look at how a press moves the skin along itself{slides}")
+    return Reason(True, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
