@@ -57,5 +57,5 @@ RUNGS: dict[str, Fidelity] = {
 def rung(name: str) -> Fidelity:
     """Return the settings of the contact solver `name`; raises UsageError for an unknown name."""
     if name not in RUNGS:
-        raise UsageError(f"The rung {name!r} is no contact solver of the twin.", hint=f"Set rung to one of: {', '.join(RUNGS)}.")
+        raise UsageError(f"The twin has no contact solver {name!r}.", hint=f"Set rung to one of: {', '.join(RUNGS)}.")
     return RUNGS[name]
