@@ -1,4 +1,4 @@
-"""The estimators of tactbench: descriptors here, code in the modules they name, reasons in docs/estimators.md."""
+"""Descriptors of the estimators that this package provides (reasons for their choice: ``docs/estimators.md``)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ WINDOWS = (0, 5, 10, 20, 40)
 LAMBDAS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
 TREES = (500, 100, 50, 10)
-"""Forests of the ladder, and how many trees they have; the first is the paper's, and goes without a number."""
+"""Numbers of trees of the offered random forests; the first, 500, is that of Karl et al. 2016."""
 
 
 @hookimpl
 def tactbench_estimators() -> list[EstimatorDescriptor]:
-    """Offer the estimators."""
+    """Return the descriptors of the estimators that this package provides."""
     nothing: dict[str, Any] = {"looks_at": "nothing", "baseline": True}
     return [
         _estimator("mean", "Mean of the training labels", REGRESSION, "trivial:mean", **nothing),
@@ -72,7 +72,7 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
 
 
 def _estimator(name: str, title: str, kinds: tuple[str, ...], where: str, **more: Any) -> EstimatorDescriptor:
-    """Return a descriptor; unless stated otherwise its estimator is rehearsed as it is."""
+    """Return an estimator's descriptor; by default a rehearsal runs the estimator with its usual parameters."""
     fields = {"name": name, "title": title, "kinds": kinds, "where": f"tactbench.estimators.{where}", "rehearsal": {}}
     return EstimatorDescriptor.model_validate(fields | more)
 

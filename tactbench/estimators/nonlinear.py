@@ -1,4 +1,4 @@
-"""Forests, boosting, neighbours, support vectors and a small neural network."""
+"""Nonlinear estimators: forests, boosting, nearest neighbours, support vectors and a small neural network."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tactbench.plugin import Estimator, FloatArray, NotApplicable
 
 
 class Wrapped:
-    """An estimator around another one, which answers for it."""
+    """An estimator that contains another estimator (`model`) and returns that estimator's predictions."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         return np.asarray(self.model.predict(X))
 
 
@@ -27,8 +27,8 @@ class Forest(Wrapped):
     """A forest whose predictions do not depend on the timing of threads.
 
     scikit-learn adds up the trees in the order in which its threads finish them, so that the last bits of a mean change
-    from run to run. Here each thread answers rows of its own and adds the trees in order; a single row is answered
-    without any thread.
+    from run to run. Here each thread predicts rows of its own and adds the trees in order; a single row is predicted
+    without threads.
     """
 
     def __init__(self, model: Any, threads: int) -> None:
@@ -42,7 +42,7 @@ class Forest(Wrapped):
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         if self.threads == 1 or len(X) < 100 * self.threads:
             return super().predict(X)
         with ThreadPoolExecutor(self.threads) as pool:
@@ -50,7 +50,7 @@ class Forest(Wrapped):
 
 
 def forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
-    """Return a random forest (Breiman 2001), as scikit-learn builds it; the paper's curvature forest has 500 trees."""
+    """Return scikit-learn's random forest (Breiman 2001); Karl et al. 2016 use 500 trees for the curvature task."""
     from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
 
     make = RandomForestClassifier if kind == "classification" else RandomForestRegressor
@@ -58,7 +58,7 @@ def forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
 
 
 def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
-    """Return extremely randomised trees (Geurts, Ernst and Wehenkel 2006), as scikit-learn builds them."""
+    """Return scikit-learn's extremely randomised trees (Geurts, Ernst and Wehenkel 2006)."""
     from sklearn.ensemble import ExtraTreesClassifier, ExtraTreesRegressor
 
     make = ExtraTreesClassifier if kind == "classification" else ExtraTreesRegressor
@@ -68,8 +68,8 @@ def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
 class FastForest(Wrapped):
     """A forest that raises an error when scikit-learn-intelex falls back to plain scikit-learn.
 
-    The library does so silently for parameters that oneDAL does not support (more than 6024 trees, some criteria and
-    weights). A row under this name would then be one of the plain forest.
+    The library falls back silently for parameters that oneDAL does not support (more than 6024 trees, some criteria
+    and weights). The benchmark would then state the plain forest's results under the wrong name.
     """
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> FastForest:
@@ -78,7 +78,7 @@ class FastForest(Wrapped):
         Raises
         ------
         NotApplicable
-            If oneDAL did not do it.
+            If oneDAL did not grow the trees.
         """
         # daal4py compares versions with distutils: nothing a user could do, and nothing about the data.
         with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
@@ -92,19 +92,19 @@ class FastForest(Wrapped):
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return (n,) answers to X (n, p)."""
+        """Return the (n,) predictions for the features X (n, p)."""
         return super().predict(X).reshape(len(X))
 
 
 def fast_forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
-    """Return a random forest by oneDAL through scikit-learn-intelex: another implementation of the same idea.
+    """Return a random forest computed by oneDAL through scikit-learn-intelex.
 
-    It bins features (256 bins) before it splits, and draws otherwise, so that its trees are not the same trees.
+    oneDAL sorts features into 256 bins and draws other random numbers, so that its trees differ from scikit-learn's.
 
     Raises
     ------
     NotApplicable
-        If the extra is not installed.
+        If scikit-learn-intelex is not installed.
     """
     try:
         with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
@@ -112,17 +112,17 @@ def fast_forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != "sklearnex":
             raise  # it is there, and broken
-        raise NotApplicable("needs the extra: pip install 'tactbench[fast]' (x86-64 only)") from error
+        raise NotApplicable("needs scikit-learn-intelex: pip install 'tactbench[fast]' (x86-64 only)") from error
     make = RandomForestClassifier if kind == "classification" else RandomForestRegressor
     return FastForest(make(random_state=seed, n_jobs=threads, **params))
 
 
 def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:
-    """Return gradient boosting (Friedman 2001) of trees on histograms (Ke et al. 2017), as scikit-learn does it.
+    """Return scikit-learn's gradient boosting (Friedman 2001) of trees on histograms (Ke et al. 2017).
 
-    A round grows one tree, or one for each class. It never stops early: a tenth of the rows drawn at random would each
-    have a neighbour one sample away among the other nine, and say nothing about another session. Threads are OpenMP's,
-    which the core limits.
+    A round grows one tree, or one for each class. Training never stops early: the criterion would be the score on a
+    random tenth of the rows, which have neighbours one sample away among the others and so do not show the error in
+    another session. The framework limits the number of OpenMP threads.
     """
     from sklearn.ensemble import HistGradientBoostingClassifier, HistGradientBoostingRegressor
 
@@ -131,19 +131,19 @@ def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:
 
 
 class Neighbours(Wrapped):
-    """Nearest neighbours that use all rows where there are fewer than `n_neighbors`."""
+    """Nearest-neighbour estimator that uses all training rows if there are fewer than `n_neighbors`."""
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Neighbours:
-        """Keep X (n, p) and y (n,)."""
+        """Store the training features X (n, p) and labels y (n,)."""
         self.model.set_params(n_neighbors=min(self.model.n_neighbors, len(X))).fit(X, y)
         return self
 
 
 def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estimator:
-    """Return the vote, or the mean, of the `n_neighbors` nearest rows; all count alike.
+    """Return an estimator that predicts the vote, or the mean, of the `n_neighbors` nearest rows with equal weights.
 
-    Fifteen (assumed): neighbours in feature space are mostly samples that followed each other; at 100 Hz five of them
-    are a twentieth of a second and carry one draw of the slow noise.
+    Fifteen neighbours (assumed): neighbours in feature space are mostly consecutive samples; at 100 Hz five of them
+    cover a twentieth of a second and contain the same value of the slow noise.
     """
     from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 
@@ -154,8 +154,8 @@ def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estim
 class OfUnitSpread(Wrapped):
     """A regressor trained on y scaled to zero mean and unit standard deviation; it predicts in y's own unit.
 
-    The width of a support-vector tube and the step of a gradient are numbers in the target's unit: without this a
-    force in newtons and a curvature in 1/mm would be learned differently well.
+    The width of a support-vector tube and the step of a gradient are numbers in the target's unit: without scaling,
+    the quality of a fit would depend on the unit, for example on newtons or 1/mm.
     """
 
     def __init__(self, model: Any) -> None:
@@ -163,21 +163,21 @@ class OfUnitSpread(Wrapped):
         self.mean, self.spread = 0.0, 1.0
 
     def fit(self, X: FloatArray, y: FloatArray) -> OfUnitSpread:
-        """Learn y (n,) from X (n, p)."""
+        """Fit the scaled targets y (n,) to the features X (n, p)."""
         self.mean, self.spread = float(y.mean()), float(y.std()) or 1.0
         self.model.fit(X, (y - self.mean) / self.spread)
         return self
 
     def predict(self, X: FloatArray) -> FloatArray:
-        """Return (n,) answers to X (n, p), in the unit of y."""
+        """Return the (n,) predictions for the features X (n, p), in the unit of y."""
         answers: FloatArray = self.mean + self.spread * self.model.predict(X)
         return answers
 
 
 class EveryNth(Wrapped):
-    """An estimator trained on every n-th row, n such that at most `rows` are left: its fit grows faster than the rows.
+    """An estimator trained on every n-th row, with n such that at most `rows` rows are used, to limit computing time.
 
-    Rows that follow each other in time are nearly copies, so that every n-th one leaves out less than a random draw.
+    Rows that follow each other in time are nearly equal, so that every n-th row loses less than a random selection.
     """
 
     def __init__(self, model: Any, rows: int) -> None:
@@ -185,17 +185,17 @@ class EveryNth(Wrapped):
         self.rows = rows
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> EveryNth:
-        """Learn y (n,) from X (n, p)."""
+        """Fit every n-th label of y (n,) to the same rows of X (n, p)."""
         step = -(-len(X) // self.rows)
         self.model.fit(X[::step], y[::step])
         return self
 
 
 def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Estimator:
-    """Return a support vector machine (Cortes and Vapnik 1995) with a Gaussian kernel, as libsvm finds it.
+    """Return libsvm's support vector machine (Cortes and Vapnik 1995) with a Gaussian kernel.
 
-    One against one for classes, a tube of 0.1 of y's deviation for numbers. ``gamma="scale"`` is one over (features
-    times their variance): the width of the cloud itself.
+    Classes are compared in pairs; for numbers, the tube is 0.1 standard deviations of y wide. ``gamma="scale"`` is
+    1 / (number of features * their variance).
     """
     from sklearn.svm import SVC, SVR
 
@@ -204,11 +204,11 @@ def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: floa
 
 
 def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Estimator:
-    """Return one hidden layer of `hidden` rectified units, taught by Adam (Kingma and Ba 2015).
+    """Return a neural network with one hidden layer of `hidden` rectified units, trained by Adam (Kingma and Ba 2015).
 
-    A tenth of the training rows, drawn by the seed, determines the end: ten epochs without gain. Its rows have
-    neighbours one sample away among the others, so that it ends the training but does not choose well for another
-    session; `max_iter` epochs are the most.
+    Training ends after ten epochs without a better score on a tenth of the training rows, drawn by the seed, or after
+    `max_iter` epochs. These rows have neighbours one sample away among the others, so that their score ends the
+    training but does not show the error in another session.
     """
     from sklearn.neural_network import MLPClassifier, MLPRegressor
 

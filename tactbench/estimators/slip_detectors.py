@@ -1,4 +1,4 @@
-"""Detectors of slip, which give each frame a score that rises with the confidence in slip."""
+"""Slip detectors, which give each frame a score that rises with the confidence that the contact slips."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
 
 LEVELS = 5
-"""Largest number of levels of the wavelet transform: at 2.2 kHz they reach down to 34 Hz."""
+"""Largest number of levels of the wavelet transform: five levels reach down to 34 Hz at a rate of 2.2 kHz."""
 WAVELET = "db2"
 BANDS = 16
-"""Number of bands of the spectrum."""
+"""Number of frequency bands, of equal width, into which the spectrum is divided."""
 
 
 def always(*, kind: str, seed: int, threads: int) -> Any:
@@ -36,27 +36,27 @@ def never(*, kind: str, seed: int, threads: int) -> Any:
 
 
 class MeanFeature:
-    """The mean of a frame's features, each scaled by the training frames."""
+    """Detector whose score is the mean of a frame's features, each scaled by the training frames."""
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> MeanFeature:
-        """Learn nothing: the threshold is all there is to choose."""
+        """Do nothing: only the threshold, chosen elsewhere, depends on the training data."""
         return self
 
     def predict(self, X: FloatArray) -> FloatArray:
-        """Return (n,) means."""
+        """Return the (n,) means over the features of each row of X (n, p)."""
         return np.asarray(X.mean(axis=1))
 
 
 def mean_feature(*, kind: str, seed: int, threads: int) -> MeanFeature:
-    """Return a detector without anything to learn but its threshold."""
+    """Return a detector by the mean of a frame's features; only its threshold depends on the training data."""
     return MeanFeature()
 
 
 class ClassifierDetector(EveryNth):
-    """A classifier's confidence that a frame slips, learned from every n-th frame."""
+    """Detector by a classifier's confidence that a frame slips; the classifier is trained on every n-th frame."""
 
     def predict(self, X: FloatArray) -> FloatArray:
-        """Return (n,) confidences."""
+        """Return the (n,) confidences that the frames X (n, p) slip."""
         if hasattr(self.model, "decision_function"):
             return np.asarray(self.model.decision_function(X))
         return np.asarray(self.model.predict_proba(X)[:, 1])
@@ -65,7 +65,7 @@ class ClassifierDetector(EveryNth):
 def forest(
     *, kind: str, seed: int, threads: int, n_estimators: int, min_samples_leaf: int, rows: int
 ) -> ClassifierDetector:
-    """Return a random forest that weighs both classes alike."""
+    """Return a random forest with equal weights of both classes, slip and no slip."""
     from sklearn.ensemble import RandomForestClassifier
 
     model = RandomForestClassifier(
@@ -75,21 +75,21 @@ def forest(
 
 
 def support_vectors(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
-    """Return support vectors with a Gaussian kernel that weigh both classes alike."""
+    """Return a support vector machine with a Gaussian kernel and equal weights of both classes, slip and no slip."""
     from sklearn.svm import SVC
 
     return ClassifierDetector(SVC(C=C, class_weight="balanced"), rows)
 
 
 def logistic(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
-    """Return a logistic regression that weighs both classes alike."""
+    """Return a logistic regression with equal weights of both classes, slip and no slip."""
     from sklearn.linear_model import LogisticRegression
 
     return ClassifierDetector(LogisticRegression(C=C, class_weight="balanced", max_iter=1000), rows)
 
 
 def wavelet_amplitudes(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> FloatArray:
-    """Return (frames, levels) the root mean square of the wavelet details of each frame, over all channels.
+    """Return (frames, levels) root mean squares, over all channels, of the wavelet details in each frame.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def wavelet_amplitudes(stream: StreamReadings, ends_s: FloatArray, window_s: flo
 
 
 def spectrum(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> FloatArray:
-    """Return (frames, bands) amplitudes of each frame under a Hann window, over all channels, in equal bands."""
+    """Return (frames, bands) spectral amplitudes over all channels, with a Hann window, in bands of equal width."""
     windows = _windows(stream, ends_s, window_s)
     n = windows.shape[1]
     power = np.abs(np.fft.rfft(windows * np.hanning(n + 2)[1:-1, None], axis=1)[:, 1:]) ** 2
@@ -119,12 +119,12 @@ def spectrum(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> Flo
 
 
 def _windows(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> FloatArray:
-    """Return (frames, samples, channels) the last samples up to each end, less their mean; NaN where there are fewer.
+    """Return (frames, samples, channels): the last samples before each frame's end, less their mean; NaN if too few.
 
-    As many as the window has at the stream's rate, two at least.
+    The number of samples is that of the window at the stream's rate, at least two.
     """
     if stream.time_s is None or stream.rate_hz is None:
-        raise NotApplicable(f"{stream.stream} has no clock.", hint="State the clock or the rate in the mapping.")
+        raise NotApplicable(f"{stream.stream} has no time stamps.", hint="State its clock or rate in the mapping.")
     n = max(2, int(window_s * stream.rate_hz + 1e-6))
     last = np.searchsorted(stream.time_s, ends_s, side="right")
     place = last[:, None] - n + np.arange(n)

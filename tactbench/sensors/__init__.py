@@ -1,1 +1,1 @@
-"""Tactile sensors: one room each."""
+"""Tactile sensors that this package provides, each in a subpackage of its own."""

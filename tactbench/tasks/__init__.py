@@ -1,1 +1,1 @@
-"""Tasks: targets, scenes, metrics and splits of a benchmark."""
+"""Benchmark tasks that this package provides, each with its target, scenes, metrics and splits."""

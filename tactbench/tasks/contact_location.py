@@ -1,6 +1,6 @@
-"""Location of the contact on the skin, from taxels.
+"""Task: estimate the place of the contact on the skin from taxels.
 
-Its recordings are of a ball pressed at places scattered over the skin, each with the place as a reference.
+In its recordings a ball is pressed at places spread over the skin; each recording has the place as a reference.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ REACH_MM = 5.0
 """Furthest commanded offset from the nominal contact point, along the finger and along its arc (assumed): a square of
 10 mm, on which the caps of 5 mm touch both sensors' active skin throughout."""
 SESSIONS: tuple[tuple[Role, int, int], ...] = (("train", 6, 10), ("validation", 2, 10), ("test", 5, 6))
-"""Role, sessions and places a session: five test sessions are the least that an interval over sessions is made of."""
+"""Role, number of sessions, number of places in each session; an interval over sessions needs at least five."""
 _SLOT_S = 30.0
-"""From the beginning of one recording to that of the next (assumed): a press, and the way to the next place."""
+"""Seconds from the beginning of one recording to the beginning of the next (assumed): a press and a move."""
 _PRESS = ForceRamp(
     hold=assumed(2.0, "s", "unloaded, to tare on"),
     duration=assumed(12.0, "s", "2 s unloaded, then 0.5 N/s: slower than the skin creeps does not matter for a place"),
@@ -39,11 +39,11 @@ _PRESS = ForceRamp(
 )
 _RADIUS = sourced(5.0, "mm", "Karl et al. 2016: the smallest of its caps")
 _STEPS = (0.7548776662466927, 0.5698402909980532)
-"""1/g and 1/g² of the root g of g³ = g + 1: multiples of them, modulo 1, cover a square evenly (Roberts 2018, R2)."""
+"""Steps 1/g and 1/g², with g³ = g + 1, whose multiples modulo 1 cover a square evenly (Roberts 2018, R2)."""
 
 
 def _places_mm() -> Iterator[tuple[float, float]]:
-    """Yield places without end, each set of consecutive ones spread evenly over the square."""
+    """Yield endlessly many places [mm]; any consecutive places are spread evenly over the square."""
     number = 0
     while True:
         number += 1
@@ -95,5 +95,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the contact location task."""
     return [TaskDescriptor(spec=SPEC)]

@@ -1,4 +1,4 @@
-"""Which of five caps touches the sensor (Karl et al. 2016, section III-B)."""
+"""Task: decide which of five spherical caps touches the sensor (Karl et al. 2016, section III-B)."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the curvature task."""
     return [TaskDescriptor(spec=SPEC)]

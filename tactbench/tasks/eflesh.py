@@ -1,4 +1,4 @@
-"""Published scores of eFlesh, for the tasks that compare with them."""
+"""Published scores of the sensor eFlesh, for tasks that compare their results with them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tactbench.plugin import Published
 
 
 def published(score_n: float, sensor: str, title: str) -> Published:
-    """Return a published error [N], with remarks on its conditions."""
+    """Return a published error [N] of eFlesh, with remarks on the conditions of its measurement."""
     return Published(
         score=score_n,
         protocol="deployable",

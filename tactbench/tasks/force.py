@@ -1,4 +1,4 @@
-"""Normal force from taxels, pressed on a flat surface (Karl et al. 2016, section III-A)."""
+"""Task: estimate the normal force from taxels under a flat surface (Karl et al. 2016, section III-A)."""
 
 from __future__ import annotations
 
@@ -84,13 +84,13 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the force task."""
     return [TaskDescriptor(spec=SPEC)]
 
 
 @hookimpl
 def tactbench_profiles() -> list[ProfileDescriptor]:
-    """Offer the force profiles of the plugin interface by name."""
+    """Return descriptors of the force profiles in the plugin interface, so that scenes can name them."""
     above_0 = 1e-3
     peak = {"unit": "N", "text": "the largest force"}
     rise = {"unit": "s", "least": above_0, "text": "how long the way up to the first force takes"}
@@ -127,7 +127,7 @@ def tactbench_profiles() -> list[ProfileDescriptor]:
 def _profile(
     function: Callable[..., ForcePath], name: str, title: str, **parameters: Mapping[str, Any]
 ) -> ProfileDescriptor:
-    """Return the descriptor of a function of the door, with the function's own defaults."""
+    """Return the descriptor of a profile function in the plugin interface, with the function's own defaults."""
     own = signature(function).parameters
     return ProfileDescriptor(
         name=name,

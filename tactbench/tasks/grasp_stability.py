@@ -1,4 +1,4 @@
-"""Prediction, from one static reading before the lift, of whether a grasped object will slip."""
+"""Task: predict, from one static reading before the lift, if a grasped object will slip."""
 
 from __future__ import annotations
 
@@ -23,5 +23,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the grasp stability task."""
     return [TaskDescriptor(spec=SPEC)]

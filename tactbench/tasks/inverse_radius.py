@@ -1,4 +1,4 @@
-"""Curvature of the surface as a number, so that unseen radii can be interpolated.
+"""Task: estimate the curvature of the surface as a number, also for radii absent from training.
 
 Karl et al. 2016 classify five caps and hope to "linearly interpolate unseen curvature radii". Here the curvature 1/R
 itself is predicted, a flat surface being 0, and each radius is left out in turn. The smallest and the largest curvature
@@ -55,5 +55,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the task `inverse-radius`."""
     return [TaskDescriptor(spec=SPEC)]

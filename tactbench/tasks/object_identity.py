@@ -1,4 +1,4 @@
-"""Identity of the grasped object from taxels, one answer per frame."""
+"""Task: identify the grasped object from taxels, with one prediction for each frame."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the object identity task."""
     return [TaskDescriptor(spec=SPEC)]

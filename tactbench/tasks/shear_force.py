@@ -1,4 +1,4 @@
-"""Shear force from taxels, from recordings whose load cell measured along the surface."""
+"""Task: estimate the shear force from taxels, for recordings whose load cell measured forces along the surface."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the shear force task."""
     return [TaskDescriptor(spec=SPEC)]

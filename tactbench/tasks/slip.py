@@ -1,4 +1,4 @@
-"""When does the contact begin to slip? Events in time, by all streams of a sensor and by its taxels alone."""
+"""Tasks: detect the times at which the contact begins to slip, from all streams of a sensor or its taxels alone."""
 
 from __future__ import annotations
 
@@ -62,5 +62,5 @@ TAXELS = SPEC.model_copy(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the tasks."""
+    """Return the descriptors of the slip detection tasks."""
     return [TaskDescriptor(spec=SPEC), TaskDescriptor(spec=TAXELS)]

@@ -1,8 +1,8 @@
-"""The recordings behind the slip tasks: surfaces dragged over a pressed skin, and disturbances that are no slip.
+"""Recordings for the slip tasks: surfaces dragged over a pressed skin, and disturbances without slip.
 
-A cap is pressed and held; at a moment of its own its surface begins to move, and does so to the end. In a disturbance
-the surface moves by so little that the skin follows it (the start of a motor), and the normal force changes: presses,
-taps, ripples. Every condition is recorded in each of four sessions, two of them for training.
+A cap is pressed and held; at a varying moment its surface begins to move, and moves to the end. In a disturbance the
+surface moves by so little that the skin follows without slip (the start of a motor), and the normal force changes:
+presses, taps, ripples. Every condition is recorded in each of four sessions, two of them for training.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ _CHOICE = "a condition of the slip campaign"
 SESSIONS: Mapping[str, Role] = {
     "train-1": "train", "train-2": "train", "validation": "validation", "test": "test",
 }  # fmt: skip
-"""Sessions of the campaign and their roles."""
+"""Names of the recording sessions, and their role: training, validation or test."""
 SPEEDS_MM_S = (10.0, 20.0, 50.0)
 FORCES_N = (0.5, 1.5)
 REFERENCE_HZ = 500.0
-"""Rate of the reference clock: an onset is labelled to 2 ms."""
+"""Rate of the reference clock: the onset of slip is labelled to 2 ms."""
 HOLD_S, PRESS_S = 0.5, 0.3
-"""Durations without contact, and of the rise of the force."""
+"""Durations [s] without contact at the beginning of a recording, and of the force's rise."""
 EARLIEST_S, SPREAD_S = 1.6, 1.0
-"""Earliest start of a drag, and its largest delay; it varies so that no clock predicts it."""
+"""Earliest start [s] of a drag, and its largest additional delay [s]; it varies so that time does not predict slip."""
 SLIP_S = 4.6
-"""Length of a recording with a slip."""
+"""Duration [s] of a recording with a slip."""
 PATTERN_S = 12.0
-"""Duration of a pattern of disturbances; the first begins at 3 s."""
+"""Duration [s] of a pattern of disturbances; the first pattern begins at 3 s."""
 TIMES: Mapping[Role, int] = {"train": 1, "validation": 3, "test": 3}
-"""How many recordings there are of each disturbance, and how many patterns in each: six disturbances, nine times, are
-eleven minutes, in which one false alarm a minute is more than ten alarms."""
+"""Number of recordings of each disturbance, and of patterns in each recording, by role: six disturbances, nine times,
+last eleven minutes, in which one false alarm per minute is more than ten alarms."""
 DISTURBED_S = 3.0
-"""Length of a recording of disturbances without its patterns."""
+"""Duration [s] of a recording of disturbances without its patterns."""
 START_MM = 0.02
-"""How far the surface moves when a motor starts and nothing slips: a fifth of the least way that the skin of a BioTac
-follows (0.11 mm), and of the displacement that is labelled a slip."""
+"""Distance [mm] that the surface moves when a motor starts without slip: a fifth of the least distance by which a
+BioTac's skin follows a surface (0.11 mm), and of the displacement that is labelled a slip."""
 SLOT_S = 60.0
 _GOLDEN = 0.6180339887498949
-"""Fraction of the golden ratio, whose multiples modulo 1 spread evenly."""
+"""Fractional part of the golden ratio, whose multiples modulo 1 spread evenly over 0 to 1."""
 
 
 def _surface(static: float, kinetic: float, rms_um: float, roll_off_mm: float) -> Surface:
@@ -60,11 +60,11 @@ SURFACES: Mapping[str, Surface] = {
 """Dragged surfaces: a polished one, the twin's default, a coarse one, and a knitted fabric."""
 
 Points = list[tuple[float, float]]
-"""Times [s] and forces [N]."""
+"""Corners of a force profile: pairs of a time [s] and a force [N]."""
 
 
 def presses(force_n: float, patterns: int) -> Points:
-    """Return four releases and presses a pattern, each slower than the one before."""
+    """Return a force profile with four releases and presses in each pattern, each slower than the one before."""
     points = []
     for place in range(4 * patterns):
         number, begin_s = place % 4, 3.0 + 3.0 * place
@@ -74,7 +74,7 @@ def presses(force_n: float, patterns: int) -> Points:
 
 
 def taps(force_n: float, patterns: int) -> Points:
-    """Return eight taps a pattern on the pressed skin, of 30 ms and half a newton more, at uneven intervals."""
+    """Return a force profile with eight taps in each pattern (30 ms, half a newton added), at uneven intervals."""
     points = []
     for number in range(8 * patterns):
         begin_s = 3.0 + PATTERN_S * (number // 8) + 1.3 * (number % 8) + 0.5 * (_GOLDEN * number % 1.0)
@@ -83,7 +83,7 @@ def taps(force_n: float, patterns: int) -> Points:
 
 
 def ripples(force_n: float, patterns: int) -> Points:
-    """Return three triangular ripples a pattern, of two seconds: 5 Hz of a fifth of the force, 20 and 40 Hz of less."""
+    """Return a force profile with three triangular 2 s ripples per pattern: 5 Hz (a fifth of the force), 20, 40 Hz."""
     points = []
     for place in range(3 * patterns):
         begin_s, (rate_hz, share) = 3.0 + 4.0 * place, ((5.0, 0.2), (20.0, 0.05), (40.0, 0.02))[place % 3]
@@ -97,7 +97,7 @@ def ripples(force_n: float, patterns: int) -> Points:
 
 
 DISTURBANCES: Mapping[str, Callable[[float, int], Points]] = {"presses": presses, "taps": taps, "ripples": ripples}
-"""Patterns of the normal force without slip, by kind."""
+"""Functions that return the normal force of disturbances without slip, by kind of disturbance."""
 
 
 def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:
@@ -113,7 +113,7 @@ def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:
 def _planned(
     name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = "", time: int = 0
 ) -> PlannedScene:
-    """Return one recording: of a slip, or of a kind of disturbance."""
+    """Return the plan of one recording, of a slip or of a kind of disturbance."""
     start_s = EARLIEST_S + SPREAD_S * (_GOLDEN * number % 1.0)
     patterns = TIMES[SESSIONS[session]]
     own = DISTURBANCES[kind](force_n, patterns) if kind else []
@@ -171,4 +171,4 @@ def _campaign() -> Iterator[PlannedScene]:
 
 
 SLIP_SCENES: tuple[PlannedScene, ...] = tuple(_campaign())
-"""24 conditions of slip once in each of four sessions; six of disturbances, in validation and test three times."""
+"""Recordings of four sessions: 24 conditions of slip once each; six of disturbances, three times outside training."""

@@ -1,4 +1,4 @@
-"""Did the object slip during a recording? One answer a recording."""
+"""Task: decide if the object slipped during a recording, with one prediction for each recording."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the slip sequence task."""
     return [TaskDescriptor(spec=SPEC)]

@@ -1,4 +1,4 @@
-"""Does the contact stick, slip in part or slip as a whole? One answer a frame."""
+"""Task: decide for each frame if the contact sticks, slips in part or slips as a whole."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the slip state task."""
     return [TaskDescriptor(spec=SPEC)]

@@ -1,9 +1,9 @@
-"""The recordings of the tasks: surfaces, places, units and sessions.
+"""Recordings of the force and curvature tasks: surfaces, places, sensor units and sessions.
 
-One campaign serves several tasks: each takes the surfaces that it needs, and a scene in two of them is recorded
-once. The paper's own three sessions are as Karl et al. 2016 describe them. The campaigns beyond the paper take 1000
-samples in the paper's 60 s: neighbouring rows of a slow ramp hold little new. All begin an hour after power-on, a
-scene's default, so that a cap, a placement, a unit or a session differs by itself and not by the sensor's warm-up.
+Several tasks share one set of recordings: each uses the surfaces that it needs, and a scene in two tasks is recorded
+once. The three sessions of the paper are as Karl et al. 2016 describe them. Other recordings take 1000 samples in the
+paper's 60 s, because neighbouring samples of a slow ramp are nearly equal. All begin an hour after power-on, a scene's
+default, so that differences between caps, placements, units or sessions do not come from the sensor's warm-up.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from tactbench.plugin import ForceRamp, Indenter, Placement, PlannedScene, Quant
 
 PAPER = "Karl et al. 2016"
 RADII_MM = (5.0, 7.5, 10.0, 20.0, 40.0)
-"""Radii of the caps; source: the paper's figure of curved objects."""
+"""Radii of the spherical caps; source: the figure of curved objects in Karl et al. 2016."""
 FLAT = "flat"
-"""Label of the surface without a radius; it stands for an infinite one."""
+"""Label of the flat surface, in place of an infinite radius."""
 Surfaces = tuple[float | None, ...]
 SURFACES: Surfaces = (*RADII_MM, None)
-"""Radii in mm; None is flat."""
+"""All surfaces by their radius [mm]; None is the flat surface."""
 SLOT_S = 120.0
-"""A minute of recording and a minute to exchange the cap."""
+"""Seconds between the beginnings of two recordings: a minute of recording and a minute to exchange the cap."""
 
 PLACES_MM = ((0.0, 0.0), (1.5, 0.0), (-1.5, 0.0), (0.0, 1.5), (0.0, -1.5))
-"""Commanded offsets (along the finger, along its arc) from the nominal contact point: half a pad's 3 mm, a cross."""
+"""Commanded offsets (along the finger, along its arc) from the nominal contact point: a cross of half a pad's 3 mm."""
 UNITS = ("1", "2", "3", "4", "5")
 TRAINING_SESSIONS = 10
 TEST_SESSIONS = 5
-"""Fewest sessions from which an interval over sessions can be computed."""
+"""Number of test sessions: the least from which a confidence interval over sessions can be computed."""
 FEW = (1, 2, 5, 10)
-"""Training sessions of the few-shot splits."""
+"""Numbers of training sessions in the few-shot splits."""
 
 SHORT = ForceRamp(samples=1000)
 NOMINAL = Placement()
@@ -38,7 +38,7 @@ NOTHING: Mapping[str, str] = {}
 
 
 def indenter(radius_mm: float | None) -> Indenter:
-    """Return a cap, or flat."""
+    """Return a spherical cap of the radius `radius_mm`, or the flat surface for None."""
     if radius_mm is None:
         return Indenter()
     return Indenter(radius=sourced(radius_mm, "mm", f"{PAPER}, figure of curved objects"))
@@ -52,15 +52,15 @@ def labels(radius_mm: float | None) -> dict[str, str | float | int]:
 
 
 def surface_name(radius_mm: float | None) -> str:
-    """Return a surface's name, fit for a file name."""
+    """Return the name of a surface, with characters allowed in a file name."""
     return FLAT if radius_mm is None else f"cap-{radius_mm:g}mm"
 
 
 def papers_caps() -> tuple[PlannedScene, ...]:
-    """Return the paper's curvature recordings: every cap once in each of three sessions, one after the other.
+    """Return the curvature recordings of Karl et al. 2016: every cap once in each of three consecutive sessions.
 
-    The paper does not state in which order the caps followed each other: it is drawn, session by session, so that the
-    warm-up of the sensor does not reveal the cap.
+    The paper does not state the order of the caps: it is drawn for each session, so that the warm-up of the sensor
+    does not reveal the cap.
     """
     return tuple(
         PlannedScene(
@@ -80,7 +80,7 @@ def papers_caps() -> tuple[PlannedScene, ...]:
 
 
 def at_places(surfaces: Surfaces = SURFACES) -> tuple[PlannedScene, ...]:
-    """Return recordings at every place, all surfaces at one place before the next."""
+    """Return recordings of `surfaces` at every place; all surfaces at one place precede those at the next."""
     return tuple(
         _planned(
             radius,
@@ -95,14 +95,14 @@ def at_places(surfaces: Surfaces = SURFACES) -> tuple[PlannedScene, ...]:
 
 
 def on_units(surfaces: Surfaces = SURFACES) -> tuple[PlannedScene, ...]:
-    """Return recordings on every unit of the sensor, each as warm as the others."""
+    """Return recordings of `surfaces` on every unit of the sensor, all units being equally warm."""
     return tuple(
         _planned(radius, f"unit-{unit}", unit=unit, more={"unit": unit}) for unit in UNITS for radius in surfaces
     )
 
 
 def in_sessions(number: int, surfaces: Surfaces = SURFACES) -> tuple[PlannedScene, ...]:
-    """Return the first `number` training sessions, one recording of every surface each."""
+    """Return the recordings of the first `number` training sessions, one of every surface in each session."""
     return tuple(
         _planned(radius, f"session-{session}", first_slot=len(SURFACES) * (session - 1))
         for session in range(1, number + 1)
@@ -111,7 +111,7 @@ def in_sessions(number: int, surfaces: Surfaces = SURFACES) -> tuple[PlannedScen
 
 
 def few_shots(surfaces: Surfaces = SURFACES) -> dict[str, tuple[PlannedScene, ...]]:
-    """Return the campaign of every few-shot split: its training sessions, and test sessions that all of them share."""
+    """Return the recordings of every few-shot split, by name: its training sessions, and the common test sessions."""
     test = tuple(
         _planned(radius, f"test-{session + 1}", role="test", first_slot=len(SURFACES) * (TRAINING_SESSIONS + session))
         for session in range(TEST_SESSIONS)
@@ -130,7 +130,7 @@ def _planned(
     placement: Placement = NOMINAL,
     more: Mapping[str, str] = NOTHING,
 ) -> PlannedScene:
-    """Return one recording; its slot is that of its surface in the whole campaign, whichever others are recorded."""
+    """Return one recording; its start time depends on its surface, not on the selection of other recordings."""
     scene = Scene(
         name=f"{surface_name(radius_mm)}-{session}",
         indenter=indenter(radius_mm),

@@ -1,7 +1,7 @@
-"""Normal and tangential force from taxels, from recordings with a three-axis reference.
+"""Task: estimate normal and tangential force from taxels, for recordings with a three-axis force reference.
 
-It has no scenes: electrodes and taxels of the twin's own sensors do not answer to shear, and a score from them would be
-that of the normal force alone.
+The task has no simulated scenes: electrodes and taxels of the twin's sensors do not respond to shear, and their score
+would be that of the normal force alone.
 """
 
 from __future__ import annotations
@@ -28,5 +28,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Offer the task."""
+    """Return the descriptor of the three-axis force task."""
     return [TaskDescriptor(spec=SPEC)]

@@ -12,7 +12,7 @@ _HERE = "tactbench.rigs.twin"
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
-    """Offer the rig."""
+    """Return the descriptor of the twin, the simulated rig."""
     return [
         RigDescriptor(
             name="twin",
@@ -28,7 +28,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
 
 @hookimpl
 def tactbench_effects() -> list[EffectDescriptor]:
-    """Offer the twin's own effects."""
+    """Return the descriptors of the effects that this package provides for the twin."""
     return [
         _effect("force-loop", "Motor under force control", "effects.force_loop:apply", "", "load reference-force"),
         _effect("contact", "Normal contact", "contact.stages:press_skin", "load core", "skin"),
@@ -79,7 +79,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
 
 @hookimpl
 def tactbench_indenters() -> list[IndenterDescriptor]:
-    """Offer the usual shapes; scenes store a cap or a flat surface as a radius or its absence."""
+    """Return the descriptors of the usual indenters; scenes store a cap as a radius, a flat surface as no radius."""
     radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
     return [
         _indenter("cap", "Spherical cap", radius=radius),

@@ -1,4 +1,4 @@
-"""The unrolled skin: its grid, the gap to an indenter. Millimetres.
+"""Geometry of the unrolled skin in millimetres: its grid, and the gap between skin and indenter.
 
 ``x`` runs along the finger, ``s`` along the arc of its outer surface; ``theta = s / outer radius``.
 """
@@ -15,25 +15,25 @@ from tactbench.plugin.simulation import Dome, SkinGrid, SkinSheet
 from tactbench.rigs.twin.shapes import Shape, sag_mm
 
 STEEPEST = 1.0
-"""Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's
-normal, which agree for gentle slopes only."""
+"""Largest allowed slope of an indenter, 45 degrees: the gap is measured along the press axis and the deflection along
+the skin's normal, directions that agree for gentle slopes only."""
 _FEWEST_CELLS = 4
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Place and shape of the contact of an indenter."""
+    """Place, tilt and shape of an indenter on the skin."""
 
     radius_mm: float
-    """Radius of the cap; infinite for a flat surface and for another shape."""
+    """Radius of a spherical cap; infinite for a flat surface and any other shape."""
     x_mm: float
-    """Apex along the finger, in the sheet's coordinates."""
+    """Position of the indenter's apex along the finger, in the sheet's coordinates."""
     s_mm: float
-    """Apex along the arc."""
+    """Position of the indenter's apex along the arc of the finger's surface."""
     tilt_x: float = 0.0
-    """Slope of the indenter along the finger [1]."""
+    """Slope [1], rise over run, of the tilted indenter along the finger."""
     tilt_s: float = 0.0
-    """Slope of the indenter across the finger [1]."""
+    """Slope [1], rise over run, of the tilted indenter across the finger."""
     shape: Shape | None = None
     """Shape of an indenter that is neither flat nor a cap."""
 
@@ -41,7 +41,7 @@ class Contact:
 def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
     """Return the cell centres of `sheet`, ``x_min + (i + 1/2) dx`` and ``-arc/2 + (j + 1/2) ds``.
 
-    `cells` along x and s take the place of the sheet's own.
+    `cells` (numbers along x and s) replaces the sheet's own numbers of cells.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
         raise RigError(
             f"The skin's sheet runs from x = {x_min:g} to {x_max:g} mm and {arc:g} mm across, on a radius of {outer:g} "
             f"mm, in {along} x {across} cells.",
-            hint=f"Its sides and radius must be positive and finite, its cells at least {_FEWEST_CELLS} either way.",
+            hint=f"Give positive, finite sides and radius, and at least {_FEWEST_CELLS} cells along x and s.",
         )
     dx, ds = (x_max - x_min) / along, arc / across
     x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
@@ -64,22 +64,22 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
 
 
 def outer_radius_mm(sheet: SkinSheet) -> float:
-    """Return the radius of the finger's outer surface; infinite for a flat pad."""
+    """Return the radius [mm] of the finger's outer surface; infinity for a flat pad."""
     return math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
 
 
 def radius_mm(indenter: Indenter) -> float:
-    """Return the cap's radius; infinite for a flat surface and for another shape."""
+    """Return the radius [mm] of a spherical cap; infinity for a flat surface and any other shape."""
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
 def gap_mm(grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None) -> FloatArray:
     """Return the (nx, ns) gap between unloaded skin and indenter at zero approach; a skin without a sheet is flat.
 
-    The press axis is the skin's normal at the contact, on the dome as on the cylinder. The fall-away of the finger
-    (``2 Ro sin²(theta/2)`` on the cylinder) and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written so that
-    nothing cancels: R = 1e9 mm and a flat surface agree to rounding. With a tilt the smallest gap is subtracted, so
-    that the approach keeps its origin. With a relief the press axis stays that normal.
+    The press axis is the skin's normal at the contact, on the dome as on the cylinder, also for a skin with a relief.
+    The depth of the finger's surface below the tangent plane (``2 Ro sin²(theta/2)`` on the cylinder) and the height
+    ``r² / (R + sqrt(R² - r²))`` of the cap are computed without cancellation: R = 1e9 mm and a flat surface agree to
+    rounding. For a tilted indenter the smallest gap is subtracted, so that the approach is 0 at first touch.
     """
     x, y, fall = around_mm(grid, contact, sheet)
     own = sag_mm(x**2 + y**2, contact.radius_mm) if contact.shape is None else contact.shape.height_mm(x, y)
@@ -93,9 +93,9 @@ def gap_mm(grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None) -> 
 def around_mm(
     grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return where the finger's surface lies as seen from the contact: along, across, and below its tangent plane.
+    """Return the positions of the finger's surface relative to the contact: along, across, below the tangent plane.
 
-    Each broadcasts to (nx, ns).
+    Each of the three arrays broadcasts to (nx, ns).
 
     A point at meridian angle phi (0 on the cylinder) and angle theta from the contact lies at ``(X, Ro cos(phi)
     sin(theta), -Ro cos(phi) cos(theta))`` with ``sin(phi) = (X - start) / Ro`` on the dome; the differences
@@ -126,7 +126,7 @@ def around_mm(
 
 
 def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:
-    """Return the meridian angle at `x_mm` and the axial place on the finger's surface: its own up to the dome's end."""
+    """Return the meridian angle at `x_mm`, and `x_mm` limited to the axial range of the finger's surface."""
     if dome is None:
         return np.zeros_like(x_mm), x_mm
     start = dome.start.to("mm")
@@ -134,7 +134,7 @@ def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[Float
 
 
 def check_contact(grid: SkinGrid, contact: Contact) -> None:
-    """Refuse a contact that the grid cannot resolve or that misses the skin.
+    """Raise an error for a contact that the grid cannot resolve or that lies off the skin.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
     slope = math.hypot(contact.tilt_x, contact.tilt_s)
     if not slope <= STEEPEST:
         raise RigError(
-            f"The indenter is tilted to a slope of {slope:.3g}; up to {STEEPEST:g}, 45 degrees, can be pressed.",
+            f"The indenter is tilted to a slope of {slope:.3g}; at most {STEEPEST:g}, 45 degrees, is allowed.",
             hint="Correct tilt_x and tilt_s of the scene's placement.",
         )
     x_low, x_high = grid.x_mm[0] - dx / 2, grid.x_mm[-1] + dx / 2
@@ -174,6 +174,6 @@ def _check_resolved(shape: Shape, cell_mm: float) -> None:
         sizes = ", ".join(f"{name} {value:g}" for name, value in shape.sizes)
         raise RigError(
             f"The indenter {shape.name!r} ({sizes}) rises by {risen:.3g} mm within {cell_mm:.2f} mm, a cell of the "
-            f"skin; up to {cell_mm:.2f} mm, 45 degrees, can be pressed.",
-            hint="Use a blunter or wider one, or a sensor spec with more cells.",
+            f"skin; at most {cell_mm:.2f} mm, 45 degrees, is allowed.",
+            hint="Use a blunter or wider indenter, or a sensor spec with more cells.",
         )

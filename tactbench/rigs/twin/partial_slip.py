@@ -26,23 +26,23 @@ def shear_modulus_mpa(skin: Skin) -> float:
 
 
 def sliding_stiffness(contact_radius_mm: FloatArray, shear_mpa: float) -> FloatArray:
-    """Return ``16 a G*/3`` [N/mm]: tangential force over displacement when everything slips (Johnson 7.42).
+    """Return ``16 a G*/3`` [N/mm]: tangential force over displacement of a contact in full slip (Johnson 7.42).
 
-    With tractions in proportion to the pressure, as in full slip, it holds for any force; a contact that sticks
-    everywhere is stiffer by half, ``8 a G*`` (Johnson 7.44).
+    The formula holds for any force if tractions are proportional to the pressure, as in full slip; a contact that
+    sticks everywhere is stiffer by half, ``8 a G*`` (Johnson 7.44).
     """
     return np.asarray(16.0 / 3.0 * contact_radius_mm * shear_mpa)
 
 
 def share_of_force(travelled: FloatArray) -> FloatArray:
-    """Return the share of the way to full slip in force, from the share in displacement: ``1 - (1 - s)^(3/2)``.
+    """Return the share of the force needed for full slip, from the share s of the displacement: ``1 - (1 - s)^(3/2)``.
 
-    Johnson 7.42 solved for the force. It counts from where the tractions were last in proportion to the pressure: from
-    rest, or from the end of a slip, because Cattaneo's argument applies to the rest of the limit as to all of it.
+    This is Johnson 7.42 solved for the force. Both shares count from the last state with tractions proportional to the
+    pressure, at rest or at the end of a slip: Cattaneo's argument holds from either.
     """
     return np.asarray(1.0 - (1.0 - np.clip(travelled, 0.0, 1.0)) ** 1.5)
 
 
 def stick_ratio(travelled: FloatArray) -> FloatArray:
-    """Return c/a from the share of the way to full slip: ``(1 - Q/(mu P))^(1/3) = sqrt(1 - s)`` (Johnson 7.39)."""
+    """Return c/a from the share s of full slip's displacement: ``(1 - Q/mu P)^(1/3) = sqrt(1 - s)`` (Johnson 7.39)."""
     return np.asarray(np.sqrt(1.0 - np.clip(travelled, 0.0, 1.0)))

@@ -1,8 +1,8 @@
-"""Planning: which effects a scene gets, in which order, and why.
+"""Selection and order of the effects that simulate a scene, with a reason for each.
 
-Effects name the tokens that they produce and consume. Observed tokens are needed. An effect that produces a needed
-token is included if its predicate calls for it or the scene names it; then the tokens that it consumes are needed, too.
-No other effect is imported or applied.
+Effects name the tokens (results) that they produce and consume. Tokens observed by the scene are needed. An effect that
+produces a needed token is included if its own decision function or the scene includes it; then the tokens that it
+consumes are needed, too. No other effect is imported or applied.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from tactbench.rigs.twin.effects.called_for import NOT_OBSERVED
 from tactbench.rigs.twin.synthesis import Settled
 
 STORED = "stored"
-"""Token of the stored samples, which every recording needs."""
+"""Name of the result "stored samples", which every recording needs."""
 REFERENCE = "reference-force"
-"""Token of the reference force, which every recording needs."""
+"""Name of the result "reference force", which every recording needs."""
 LENT = "core"
-"""Token of effects that the contact solver applies by itself when a load needs them."""
+"""Name of the result of effects that the contact solver itself applies when a load needs them."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The effects of one scene."""
+    """Effects that simulate one scene, in order, with the reasons for and against each."""
 
     kinds: tuple[ChannelKind, ...]
     """Kinds of channels that will be recorded."""
     entries: tuple[PlanEntry, ...]
-    """Included effects in their order, then those left out."""
+    """Included effects in the order of application, followed by the effects left out."""
     stages: tuple[EffectDescriptor, ...]
-    """Effects to apply, in order."""
+    """Descriptors of the effects to apply, in order."""
     lent: Mapping[str, str]
-    """Effects that the solver may apply: name -> ``module:callable``."""
+    """Effects that the contact solver may apply: name -> ``module:callable``."""
 
     def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
-        """Return the entries with those that only the solve could decide replaced."""
+        """Return the entries, after replacing those that could be decided only after the contact was solved."""
         entries = [
             entry.model_copy(update=decided[entry.effect]._asdict()) if entry.effect in decided else entry
             for entry in self.entries
@@ -55,12 +55,12 @@ class Plan:
 
 
 def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: SensorSpec) -> Plan:
-    """Plan one scene with one sensor.
+    """Return the plan of one scene with one sensor.
 
     Raises
     ------
     NotApplicable
-        If nothing observed is among the sensor's channels, or no included effect gives an observed kind.
+        If the sensor has no channel of the observed kinds, or no included effect computes an observed kind.
     """
     kinds = _observed(scene, sensor)
     signed = _signed(effects, scene)
@@ -79,7 +79,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
             raise NotApplicable(
                 f"The twin does not model {kind} of {sensor.name}: no installed effect produces it in this scene"
                 + (f" without {', '.join(without)}." if without else "."),
-                hint="Record it on hardware or replay it, or install a plugin with such an effect.",
+                hint="Record or replay a real sensor, or install a plugin with an effect for this kind.",
             )
     ordered = _ordered(included)
     left_out = [effect for effect in effects if effect not in included]
@@ -92,12 +92,12 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
 
 
 def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]:
-    """Return the effects that the scene names with a sign: effect -> whether it is included; later words win.
+    """Return the effects that the scene includes (True) or leaves out (False) by name; later words override earlier.
 
     Raises
     ------
     UsageError
-        If a word is neither an effect, nor a group of them, nor ``all``.
+        If a word is neither an effect, nor a group of effects, nor ``all``.
     """
     signed: dict[str, bool] = {}
     for word in scene.simulation.effects:
@@ -106,7 +106,7 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
         if not meant:
             groups = sorted({group for effect in effects for group in effect.groups} | {"all"})
             raise UsageError(
-                f"No installed effect is called {name!r}, which {word!r} names.",
+                f"The word {word!r} of the scene's effects names {name!r}, which is not an installed effect.",
                 hint=f"Effects: {', '.join(effect.name for effect in effects)}. Groups: {', '.join(groups)}.",
             )
         for found in meant:
@@ -140,7 +140,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
     if not kinds:
         raise NotApplicable(
-            f"needs a channel of kind {' or '.join(scene.observe) or '(none named)'}; {sensor.name} has "
+            f"needs a channel of kind {' or '.join(scene.observe) or '(no kind named)'}; {sensor.name} has "
             f"{', '.join(sorted(present))}."
         )
     return kinds
@@ -149,10 +149,9 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 def _needed(
     effects: Sequence[EffectDescriptor], tokens: set[str], signed: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
-    """Return the reasons of all effects, by name.
+    """Return the reasons to include or leave out each effect, by the effect's name.
 
-    Only what is included needs what it consumes: the inputs of an effect that is left out are not included for its
-    sake.
+    Only an included effect makes the tokens that it consumes needed.
     """
     reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
     taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
@@ -168,7 +167,7 @@ def _needed(
 
 
 def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:
-    """Return producers before consumers, otherwise in the order given."""
+    """Return effects sorted such that a producer precedes its consumers, otherwise in the order given."""
     waiting, done = list(effects), []
     while waiting:
         for effect in waiting:
@@ -178,8 +177,8 @@ def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:
         else:
             names = ", ".join(effect.name for effect in waiting)
             raise PluginContractError(
-                f"The effects {names} consume each other's results in a circle.",
-                hint="Correct produces and consumes in their descriptors.",
+                f"The effects {names} consume each other's results in a circle, so that none can be first.",
+                hint="Correct `produces` and `consumes` in their descriptors.",
             )
         waiting.remove(effect)
         done.append(effect)

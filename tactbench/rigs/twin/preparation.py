@@ -25,16 +25,16 @@ from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 _OWN_CLOCK_FROM = 2.0
-"""A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
+"""Ratio of a stream's rate to the sensor's slowest rate from which the stream is simulated on its own clock."""
 MOST_SAMPLES = 20_000_000
-"""Limit on the samples of a stream: two and a half hours at 2200 Hz, 160 MB per channel and effect."""
+"""Largest number of samples in a stream: two and a half hours at 2200 Hz, 160 MB per channel and effect."""
 _NOT_BELOW_ZERO = (
     "scatter", "tilt_scatter", "start", "end", "hold", "since_power_on", "force_noise",
     "proportional", "integral", "delay", "motor_lag", "resolution",
 )  # fmt: skip
-"""Fields of a scene, the force loop included, that must not be negative."""
+"""Names of the fields of a scene and its force loop that must not be negative."""
 _ABOVE_ZERO = ("duration", "force_filter", "cutoff", "rate", "speed", "acceleration")
-"""Fields of a scene that must be positive."""
+"""Names of the fields of a scene that must be above 0."""
 
 
 def prepare(
@@ -45,17 +45,16 @@ def prepare(
     fidelity: Fidelity = DEFAULT,
     indenters: Sequence[IndenterDescriptor] = (),
 ) -> Synthesis:
-    """Return the recording of `scene` before any effect is applied; `indenters` are the shapes that it may name.
+    """Return the recording of `scene` before any effect is applied; `indenters` are the shapes that a scene may name.
 
     Raises
     ------
     RigError
-        If a number of the scene is not valid, its clocks cannot be carried out, or its indenter names no installed
-        shape.
+        If a number of the scene is not valid, a stream has too many samples, or the indenter's shape is not installed.
     UsageError
-        If the shape has no such dimension.
+        If the scene gives a dimension that the shape does not have.
     NotApplicable
-        If the sensor has no scenario of the name in the scene's simulation.
+        If the sensor does not have the scenario named in the scene's simulation.
     """
     check_numbers(scene)
     sensor = handled(sensor, scene)
@@ -94,7 +93,7 @@ def carried_out(
     fidelity: Fidelity = DEFAULT,
     indenters: Sequence[IndenterDescriptor] = (),
 ) -> Synthesis:
-    """Return the recording of `scene` with every effect of its plan applied; raises what they raise."""
+    """Return the recording of `scene` with every effect of its plan applied; raises the errors of the effects."""
     run = prepare(sensor, scene, seed, plan, fidelity, indenters)
     for effect in plan.stages:
         run.apply(effect)
@@ -102,16 +101,16 @@ def carried_out(
 
 
 def _load(scene: Scene) -> tuple[FloatArray, Load]:
-    """Return the reference clock and the true force: held at the start, then straight to the end."""
+    """Return the reference clock's times [s] and the commanded normal force, piecewise linear in time."""
     profile = scene.profile
     t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
     return t_s, Load(*(np.array(corner) for corner in profile.corners))
 
 
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
-    """Yield the channels on the reference clock, then those of every stream that keeps its own.
+    """Yield the channels on the reference clock, followed by the channels of each stream with its own clock.
 
-    A scene that slides is about moments: there, no stream is faster than its sensor samples it.
+    In a scene that slides, where moments matter, no stream is sampled faster than by the real sensor.
     """
     duration = scene.profile.duration.to("s")
     slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
@@ -129,7 +128,7 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
         if rate is not None and not duration * rate <= MOST_SAMPLES:
             raise RigError(
                 f"The stream {clock} would have {duration * rate:.2g} samples: {duration:g} s at {rate:g} Hz.",
-                hint=f"Up to {MOST_SAMPLES} fit into memory: shorten the scene, or observe slower channels.",
+                hint=f"At most {MOST_SAMPLES} are allowed: shorten the scene, or observe slower channels.",
             )
         own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
         yield Track(
@@ -143,7 +142,7 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
 
 
 def _place(run: Synthesis) -> Contact:
-    """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
+    """Return the indenter's place on the skin: nominal point, commanded offset, and this mounting's random error."""
     placement = run.scene.placement
     commanded_x, commanded_s = commanded_place_mm(run.sensor.spec, run.scene)
     draws = run.of_recording("placement").standard_normal(4).tolist()
@@ -158,7 +157,7 @@ def _place(run: Synthesis) -> Contact:
 
 
 def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:
-    """Return where the apex of the indenter is to meet the skin, (x, s): the nominal point and the scene's offset."""
+    """Return the commanded place (x, s) of the indenter's apex on the skin: nominal point plus the scene's offset."""
     assert spec.skin is not None  # a scene is planned before it is prepared
     sheet, placement = spec.skin.sheet, scene.placement
     x, s = (spec.parameters.get(f"contact_{axis}") for axis in "xs")
@@ -167,20 +166,20 @@ def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:
 
 
 def check_numbers(scene: Scene) -> None:
-    """Refuse a scene with a number that is not finite, or negative where that has no meaning.
+    """Raise an error for a scene with a number that is not finite or is out of its field's range.
 
-    A radius may be infinite: that is a flat surface.
+    A radius may be infinite, for a flat surface.
 
     Raises
     ------
     RigError
-        Naming the field.
+        If a number is not allowed; the message names the field.
     """
     samples = scene.profile.samples
     if samples > MOST_SAMPLES:
         raise RigError(
-            f"Scene {scene.name!r} has {samples} samples; up to {MOST_SAMPLES} fit into memory.",
-            hint="Record in parts.",
+            f"Scene {scene.name!r} has {samples} samples; at most {MOST_SAMPLES} are allowed.",
+            hint="Divide it into several shorter scenes.",
         )
     for name, value, text in _numbers(scene, ()):
         positive = name[-1] in _ABOVE_ZERO

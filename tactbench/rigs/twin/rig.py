@@ -1,4 +1,4 @@
-"""The simulated rig: it applies the plan of a scene and yields the samples as blocks."""
+"""The simulated rig: applies the effects in a scene's plan and yields the samples as blocks."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
 _CURVE_POINTS = 4001
-"""Points of a press curve; interpolated linearly, the force is off by less than 1e-4 of the largest."""
+"""Number of points of a force-depth curve; between them, linear interpolation errs by less than 1e-4 of the largest."""
 REFERENCE_STREAM = "force_torque"
 _PLACE_CHANNELS = tuple(ChannelSpec(name=name, kind="position", unit="m") for name in ("x", "y"))
-"""Place on the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
+"""Channels of the contact's place on the unrolled skin: ``x`` along the finger towards the tip, ``y`` along its arc."""
 _ONE_CLOCK = Source(
     tag="assumed",
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
@@ -49,7 +49,7 @@ _ONE_CLOCK = Source(
 
 @dataclass(frozen=True)
 class TwinAcquisition:
-    """One simulated recording: iterate it for blocks."""
+    """One simulated recording; iterating over it yields its blocks of samples."""
 
     streams: tuple[StreamSpec, ...]
     reference: tuple[StreamSpec, ...]
@@ -57,11 +57,11 @@ class TwinAcquisition:
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
     samples: Mapping[str, Block] = field(repr=False)
-    """Samples by name of the stream, the sensor's streams first."""
+    """Blocks of samples by the name of their stream, the sensor's streams first."""
     run: Synthesis = field(repr=False)
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
-        """Return depths (n,) [m] and forces (n,) [N] of the indenter up to a force; see SimulatedPress."""
+        """Return depths (n,) [m] and normal forces (n,) [N] of the indenter up to `largest_n`; see SimulatedPress."""
         table = bare_skin(self.run, largest_n)
         forces_n: FloatArray = np.linspace(0.0, largest_n, _CURVE_POINTS)
         # Ties and dips by rounding would leave a depth without its force.
@@ -69,15 +69,15 @@ class TwinAcquisition:
         return 1e-3 * (depths_mm - depths_mm[0]), forces_n
 
     def __iter__(self) -> Iterator[Block]:
-        """Return one block of each stream."""
+        """Return an iterator over the blocks of samples, one block for each stream."""
         return iter(self.samples.values())
 
 
 class Twin:
-    """The simulated rig, with all installed shapes of indenters.
+    """The simulated rig, with the given effects and all installed shapes of indenters.
 
-    `effects` are candidates for every scene: a plan takes from them what the scene calls for. `named_effects` are
-    candidates where the sensor or the scene names them.
+    `effects` are candidates for every scene: a plan includes those that the scene needs. `named_effects` are candidates
+    only if the sensor or the scene names them.
     """
 
     def __init__(
@@ -97,14 +97,14 @@ class Twin:
         if missing:
             raise NotApplicable(
                 f"{sensor.name} is simulated with the effects {', '.join(sorted(missing))}, which are not installed.",
-                hint="Install the package that has them.",
+                hint="Install the package that provides these effects.",
             )
         return found
 
     def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
-        """Return the plan of a scene without carrying it out.
+        """Return the plan of a scene without simulating the scene.
 
-        Entries that only the solve can decide (the core) are as announced; ``open`` settles them.
+        Entries that can be decided only after the contact is solved (the core) are provisional until ``open``.
         """
         if sensor.spec.skin is None or sensor.transducer is None:
             missing = "skin" if sensor.spec.skin is None else "transducer"
@@ -117,7 +117,7 @@ class Twin:
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[TwinAcquisition]:
-        """Carry out `scene` with `sensor`; the same seed gives the same bits.
+        """Simulate `scene` with `sensor` and yield the recording; the same seed gives the same bits.
 
         Raises
         ------
@@ -206,17 +206,17 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
 def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArray, npt.NDArray[np.uint8]]:
     """Return the stream of the apex of the indenter on the skin, its (n, 2) samples [m] and their quality.
 
-    While nothing presses there is no sample.
+    There are no samples for times without contact.
 
     Raises
     ------
     NotApplicable
-        If the indenter slides: the twin computes its pressure where it was pressed on, and nowhere else.
+        If the indenter slides: the twin computes the pressure only at the place of the first contact.
     """
     if run.scene.slide is not None:
         raise NotApplicable(
-            "The twin does not move the contact over the skin: no place can be recorded of an indenter that slides.",
-            hint="Leave `slide` out, or `position` out of what is observed.",
+            "The twin does not move the contact over the skin, so it cannot record the place of a sliding indenter.",
+            hint="Remove `slide` from the scene, or `position` from its observed channels.",
         )
     place_m = 1e-3 * np.array([run.contact.x_mm, run.contact.s_mm])
     quality = np.where(run.load.at(run.t_s) > 0, Quality.GOOD, Quality.MISSING).astype(np.uint8)
@@ -225,7 +225,7 @@ def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArr
 
 
 def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]]:
-    """Return the measured force across the surface and along its motion; nothing where nothing slides."""
+    """Return the measured normal force and the force along a slide, by name; an empty dict without a slide."""
     if run.scene.slide is None or "fx" not in run.reference_more:
         return {}
     angle = run.scene.slide.direction.to("rad")
@@ -242,7 +242,7 @@ _STATED = frozenset({
     "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
     "surface_kinetic_friction", "surface_roughness_um",
 })  # fmt: skip
-"""Nuisances that every recording states; others are stated only where they were set for the run."""
+"""Nuisances that every recording states; other nuisances are stated only if they were set for the run."""
 
 
 def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
@@ -259,7 +259,7 @@ def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
 
 
 def _simulated_as(scene: Scene) -> dict[str, Scalar]:
-    """Return the scene's settings of the simulation that differ from the default: printed with every row."""
+    """Return the scene's simulation settings that differ from the defaults; they are printed with every result row."""
     own = scene.simulation
     found = {
         "effects": " ".join(own.effects) or None, "rung": own.rung, "tolerance_count": own.tolerance,

@@ -1,6 +1,6 @@
-"""Shapes of indenters as heights over a plane. Millimetres.
+"""Shapes of indenters as heights in millimetres over a plane.
 
-The heights named by this package's own descriptors stand here, beside what makes one of any plugin's ready to press.
+The module holds the shapes that this package provides, and the code that prepares any plugin's shape for pressing.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from tactbench.plugin import (
 )
 
 BEYOND_MM = 50.0
-"""How far above the body a flank is put where it is vertical, or where there is no body: large, finite, never touched.
+"""Height given to a shape where it is vertical, or where it has no body: large, finite, never touched by the skin.
 """
 RIM = 0.999
-"""Share of its radius up to which a round body exists: at its rim the flank is vertical, and no height field can touch
-it."""
+"""Share of a round body's radius up to which the body is modelled: at its rim the flank is vertical, which a height
+field cannot represent."""
 _STEP_MM = 1e-4
-"""Half of the step over which a slope is taken: far below any cell, far above rounding."""
+"""Half of the step over which a slope is computed by differences: far below a cell's width, far above rounding."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Shape:
 
     name: str
     sizes: tuple[tuple[str, float], ...]
-    """Its dimensions, each in its own unit."""
+    """Names and values of the shape's dimensions; each value is in the unit of its dimension."""
     angle: float
     """Rotation about the press axis, from x towards s [rad]."""
     height: Callable[..., FloatArray] = field(repr=False, compare=False)
@@ -48,14 +48,14 @@ class Shape:
         Raises
         ------
         PluginContractError
-            If its plugin returns an array of another shape, or numbers that are not finite.
+            If the plugin's function returns an array of wrong dimensions, or numbers that are not finite.
         """
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         x, y = np.broadcast_arrays(cos * x_mm + sin * s_mm, cos * s_mm - sin * x_mm)
         found = np.asarray(self.height(x, y, **dict(self.sizes)), dtype=np.float64)
         if found.shape != x.shape or not np.all(np.isfinite(found)):
             raise PluginContractError(
-                f"The height of the indenter {self.name!r} came back with shape {found.shape} and "
+                f"The height function of indenter {self.name!r} returned an array of shape {found.shape} with "
                 f"{np.count_nonzero(~np.isfinite(found))} values that are not finite; {x.shape} finite values are "
                 "expected.",
                 hint="Return a large height, 50 mm or more, where there is no body.",
@@ -63,7 +63,7 @@ class Shape:
         return found
 
     def slope(self, x_mm: FloatArray, s_mm: FloatArray) -> FloatArray:
-        """Return the slope [1] of the shape at places from its axis."""
+        """Return the absolute slope [1] of the shape at places (x, s) relative to its axis."""
         along = self.height_mm(x_mm + _STEP_MM, s_mm) - self.height_mm(x_mm - _STEP_MM, s_mm)
         across = self.height_mm(x_mm, s_mm + _STEP_MM) - self.height_mm(x_mm, s_mm - _STEP_MM)
         return np.asarray(np.hypot(along, across) / (2 * _STEP_MM), dtype=np.float64)
@@ -77,7 +77,7 @@ def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Sha
     RigError
         If no such shape is installed.
     UsageError
-        If a dimension is unknown, in another unit, or out of its range.
+        If a dimension is unknown, in a wrong unit, or out of its range.
     """
     if indenter.shape is None:
         return None
@@ -86,28 +86,28 @@ def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Sha
             sizes = tuple(descriptor.sizes(indenter.dimensions).items())
             return Shape(indenter.shape, sizes, indenter.angle.to("rad"), load_object(descriptor.where))
     known = ", ".join(sorted({"cap", "flat", *(one.name for one in installed)}))
-    raise RigError(f"No indenter is called {indenter.shape!r}.", hint=f"Installed are: {known}.")
+    raise RigError(f"No installed indenter is called {indenter.shape!r}.", hint=f"Choose one of: {known}.")
 
 
 def cap(x_mm: FloatArray, y_mm: FloatArray, *, radius: float) -> FloatArray:
-    """Return the height of a spherical cap."""
+    """Return the height [mm] of a spherical cap of `radius` mm above its apex."""
     return sag_mm(x_mm**2 + y_mm**2, radius)
 
 
 def flat(x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-    """Return the height of a flat surface without an edge."""
+    """Return the height, 0 mm everywhere, of a flat surface without an edge."""
     return np.zeros(np.broadcast_shapes(x_mm.shape, y_mm.shape))
 
 
 def cylinder(x_mm: FloatArray, y_mm: FloatArray, *, radius: float) -> FloatArray:
-    """Return the height of a cylinder that lies along x, without ends."""
+    """Return the height [mm] of an endless cylinder that lies along x, above its lowest line."""
     return sag_mm(y_mm**2 + 0.0 * x_mm, radius)
 
 
 def edge(x_mm: FloatArray, y_mm: FloatArray, *, wedge_angle: float, tip_radius: float) -> FloatArray:
-    """Return the height of a wedge along x, without ends: two flanks with `wedge_angle` [deg] between them.
+    """Return the height of an endless wedge along x: two flanks with `wedge_angle` [deg] between them.
 
-    They are tangents of the rounded tip, which each leaves where it is as steep as they are, ``1/tan(angle/2)``.
+    The flanks are tangents of the rounded tip, with the slope ``1/tan(angle/2)``.
     """
     slope = 1.0 / math.tan(math.radians(wedge_angle) / 2)
     away = np.abs(y_mm + 0.0 * x_mm)
@@ -127,9 +127,8 @@ def pin(x_mm: FloatArray, y_mm: FloatArray, *, radius: float, fillet: float) -> 
     """
     if fillet > radius:
         raise UsageError(
-            f"The indenter 'pin': fillet is given as {fillet:g} mm, and at most its radius, {radius:g} mm, is "
-            "expected.",
-            hint="With both alike it is a cap.",
+            f"The indenter 'pin' has a fillet of {fillet:g} mm; at most its radius, {radius:g} mm, is expected.",
+            hint="Choose a smaller fillet; a pin with a fillet equal to its radius is a cap.",
         )
     r = np.hypot(x_mm, y_mm)
     if fillet == 0:
@@ -140,7 +139,7 @@ def pin(x_mm: FloatArray, y_mm: FloatArray, *, radius: float, fillet: float) -> 
 def sag_mm(r2: FloatArray, radius: float) -> FloatArray:
     """Return the height of a circle above its lowest point at a squared distance from it; 0 for an infinite radius.
 
-    ``r² / (R + sqrt(R² - r²))``, in which nothing cancels.
+    The formula ``r² / (R + sqrt(R² - r²))`` avoids cancellation.
     """
     if math.isinf(radius):
         return np.zeros_like(r2)

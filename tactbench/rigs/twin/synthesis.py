@@ -1,4 +1,4 @@
-"""The state of a simulated recording, which the effects of its plan read and change in turn."""
+"""State of a simulated recording, which the effects of its plan read and change one after the other."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tactbench.rigs.twin.geometry import Contact
 
 
 def generator(seed: int, *scope: str) -> np.random.Generator:
-    """Return the generator of one scope, for example ``(sensor, "unit", "gain")``.
+    """Return the random number generator of one scope, for example ``(sensor, "unit", "gain")``.
 
     The scope's text is hashed (BLAKE2), so that the same seed and names give the same draws in every process and on
     every machine, and a new effect does not shift the draws of the others.
@@ -39,20 +39,20 @@ def generator(seed: int, *scope: str) -> np.random.Generator:
 
 @dataclass(frozen=True)
 class Load:
-    """A normal force that is straight between its knots and held beyond them."""
+    """A normal force over time: linear between its knots, constant before the first and after the last."""
 
     t_s: FloatArray
     """(k,) ascending seconds since the recording's first sample."""
     force_n: FloatArray
-    """(k,)"""
+    """(k,) normal force at these times."""
 
     def at(self, t_s: FloatArray) -> FloatArray:
-        """Return the (n,) force at (n,) times."""
+        """Return the (n,) normal force at (n,) seconds since the recording's first sample."""
         return np.asarray(np.interp(t_s, self.t_s, self.force_n), dtype=np.float64)
 
     @property
     def largest_n(self) -> float:
-        """The largest force."""
+        """Largest normal force of the recording."""
         return float(self.force_n.max())
 
 
@@ -60,35 +60,35 @@ class Tangential(NamedTuple):
     """The tangential state of the contact at (n,) moments, in the direction of the slide."""
 
     force_n: FloatArray
-    """Tangential force between surface and skin, as a force sensor behind the surface feels it."""
+    """Tangential force between surface and skin, as measured by a force sensor behind the surface."""
     displacement_mm: FloatArray
-    """Displacement of the skin under the contact relative to the core."""
+    """Tangential displacement of the skin under the contact relative to the core."""
     slip_mm_s: FloatArray
-    """Speed of the surface over the skin; 0 while they stick."""
+    """Speed of the surface relative to the skin under it; 0 while both stick together."""
     slip_mm: FloatArray
     """Distance that the surface has slipped over the skin."""
     slipping: npt.NDArray[np.bool_]
     """True while the whole contact slips."""
     stick_ratio: FloatArray
-    """Radius of the part that sticks over that of the contact, 0 to 1."""
+    """Radius of the sticking inner part of the contact divided by the contact's radius, 0 to 1."""
 
 
 class Settled(NamedTuple):
-    """The entry of an effect in the plan that is decided after the contact is solved."""
+    """Decision, made after the contact is solved, to include an effect in the plan or leave it out."""
 
     included: bool
     reason: str
     change: float | None = 0.0
-    """Change of an observed channel by leaving it out [the plan entry's unit]: a bound for effects left out, an
-    estimate for others; None: not known."""
+    """Change of an observed channel if the effect is left out [unit of the plan's entry]: an upper bound for effects
+    left out, an estimate for included effects; None: not known."""
 
 
 @dataclass
 class Track:
-    """The channels that share one clock."""
+    """Channels of a sensor that share one clock, with their samples."""
 
     clock: str
-    """Name of the stream whose own clock it is; empty: the scene's reference clock."""
+    """Name of the stream that has this clock for itself; empty for the scene's reference clock."""
     channels: tuple[ChannelSpec, ...]
     """Channels in the order of the sensor's streams."""
     t_s: FloatArray
@@ -96,20 +96,20 @@ class Track:
     force_n: FloatArray
     """(n,) true normal force at this clock's samples."""
     readings: FloatArray
-    """(n, channels) readings; they start at rest."""
+    """(n, channels) readings, which effects change; before the first effect they are the rest levels."""
     quality: npt.NDArray[np.uint8]
-    """(n, channels)"""
+    """(n, channels) quality flags of the readings."""
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
-    """(n,) force that the response of a kind of channel follows, where it differs from the true one."""
+    """Kind of channel -> (n,) force that its readings follow, if it differs from the true normal force."""
     vibration_mm: FloatArray | None = None
-    """(n,) vibration of the skin along its normal; None if there is none."""
+    """(n,) vibration of the skin along its normal; None if the skin does not vibrate."""
     gain: FloatArray | None = None
-    """(channels,) factors on the response; None: all one."""
+    """(channels,) factors on the change of the readings from rest; None: all factors are 1."""
     warmth_k: FloatArray | None = None
     """(n,) kelvin by which the contact has warmed the core; None: no heat flows through it."""
 
     def by_kind(self) -> dict[ChannelKind, list[int]]:
-        """Return the columns of each kind of channel."""
+        """Return the column numbers of each kind of channel in `readings`."""
         columns: dict[ChannelKind, list[int]] = {}
         for column, channel in enumerate(self.channels):
             columns.setdefault(channel.kind, []).append(column)
@@ -117,7 +117,7 @@ class Track:
 
     @property
     def scope(self) -> tuple[str, ...]:
-        """Scope of this clock's random draws, which differ from those of other clocks."""
+        """Scope of the random draws on this clock; draws on other clocks are independent."""
         return (self.clock,) if self.clock else ()
 
 
@@ -125,7 +125,7 @@ class Track:
 class Synthesis:
     """State of one recording while its effects are applied.
 
-    An effect is a callable that takes this object and changes it: ``where`` of its descriptor names it.
+    An effect is a callable that takes this object and changes it; the field ``where`` of its descriptor names it.
     """
 
     sensor: SensorDescriptor
@@ -136,46 +136,46 @@ class Synthesis:
     load: Load
     """The true normal force over time; change it by :meth:`follow`."""
     tracks: tuple[Track, ...]
-    """The sensor's channels, clock by clock."""
+    """The sensor's channels, grouped by clock."""
     contact: Contact
     reference_n: FloatArray
-    """(n,) reading of the force sensor; starts at the true force."""
+    """(n,) reading of the force sensor; equal to the true force until an effect changes it."""
     fluid_pressure: bool = False
-    """True if the pressure of the fluid is observed."""
+    """True if an observed channel needs the pressure of the fluid."""
     tangential: bool = False
-    """True if the tangential state of the skin is observed."""
+    """True if an observed channel needs the tangential state of the skin."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
     """Function from (n,) seconds to the tangential state; None if nothing slides."""
     lent: dict[str, str] = field(default_factory=dict)
-    """Effects that the solver may apply: name -> ``module:callable``."""
+    """Effects that the contact solver may apply: name -> ``module:callable``."""
     settled: dict[str, Settled] = field(default_factory=dict)
     """Plan entries that were decided after the contact was solved, by name."""
     forced: frozenset[str] = frozenset()
-    """Effects that the scene includes by name: they are applied whatever the solution of the contact."""
+    """Effects that the scene includes by name; they are applied even if they change no reading."""
     fidelity: Fidelity = DEFAULT
-    """Resolution of the contact."""
+    """Accuracy settings of the contact solver."""
     rung: str = ""
-    """Name of the rung that was chosen to keep a tolerance."""
+    """Name of the contact solver that was chosen to keep the scene's tolerance."""
     rung_error: float | None = None
-    """Estimated error of the rung in the worst observed channel, in the channel's unit; None: not estimated."""
+    """Estimated error of the chosen contact solver in the worst observed channel [its unit]; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
-    """Random draws and achieved accuracies that the recording keeps."""
+    """Random draws and achieved accuracies, by name, that are stored with the recording."""
     spent_s: dict[str, float] = field(default_factory=dict)
     """Seconds spent on each applied effect."""
     elsewhere_s: float = 0.0
-    """Seconds of the present effect that are counted under another one."""
+    """Seconds within the present effect that are counted under another effect."""
 
     def apply(self, effect: EffectDescriptor) -> None:
-        """Apply one effect, and count the seconds that it takes."""
+        """Apply one effect to this recording, and add the seconds it takes to `spent_s`."""
         began, self.elsewhere_s = time.perf_counter(), 0.0
         load_object(effect.where)(self)
         own = time.perf_counter() - began - self.elsewhere_s
         self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
 
     def follow(self, load: Load) -> None:
-        """Make `load` the true force, on every clock and for the force sensor."""
+        """Set the true normal force to `load`, on every clock and for the force sensor."""
         self.load = load
         self.reference_n = load.at(self.t_s)
         for track in self.tracks:
@@ -183,7 +183,7 @@ class Synthesis:
 
     @property
     def skin(self) -> Skin:
-        """The sensor's skin; without one no scene is planned."""
+        """The sensor's skin, which every simulated sensor has."""
         assert self.sensor.spec.skin is not None
         return self.sensor.spec.skin
 
@@ -192,22 +192,22 @@ class Synthesis:
         return self.sensor.spec.nuisances.get(kind)
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator of properties of this sensor unit, which all its recordings under a seed share."""
+        """Return the random generator for properties of this sensor unit, equal in all its recordings under a seed."""
         scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
         return generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
-        """Return the generator of properties that the recordings of a session share."""
+        """Return the random generator for properties that are equal in all recordings of a session."""
         return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator of properties of this recording."""
+        """Return the random generator for properties of this recording alone."""
         return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
         """Return one standard normal number for each recorded channel of `kind` in `track`.
 
-        Drawn for all the sensor's channels of that kind, so that recording fewer of them changes none.
+        Numbers are drawn for all the sensor's channels of this kind: they do not depend on which are recorded.
         """
         every = [channel.name for channel in self.sensor.spec.channels(kind)]
         numbers = dict(zip(every, generator.standard_normal(len(every)), strict=True))

@@ -1,6 +1,6 @@
-"""Comparison of the simulation with laws and closed forms, for ``tactbench twin verify``.
+"""Comparison of the simulation with physical laws and closed forms, for ``tactbench twin verify``.
 
-The references of the solvers (boundary elements, finite elements, fine grids) are tests: ``pytest tests/oracles``.
+Comparisons with boundary elements, finite elements and fine grids are in the tests: ``pytest tests/oracles``.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from tactbench.rigs.twin.rig import Twin, build
 
 RADIUS_MM = 10.0
 _TASK = "force"
-"""Task whose first scene is simulated for each sensor."""
+"""Name of the task whose first scene is simulated with each sensor."""
 
 
 def verdicts() -> Iterator[Verdict]:
-    """Yield the verdicts; each is computed when the iteration reaches it."""
+    """Yield the results of all comparisons; each is computed when the iteration reaches it."""
     yield from _contact()
     registry = load_registry()
     twin = build(rig_context(registry))
@@ -43,10 +43,10 @@ def verdicts() -> Iterator[Verdict]:
 
 
 def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float]:
-    """Return the change [count] by the effects left out of `scene`, and the bound on it by the plan.
+    """Return the error [count] by the effects left out of the plan of `scene`, and the plan's upper bound on it.
 
-    The change is the largest difference of any observed reading, before it is rounded, between a run with every effect
-    and one with the plan's; the bound is the sum of those that the plan states.
+    The error is the largest difference of any observed reading, before rounding, between a run with every effect and a
+    run with the plan's effects; the bound is the sum of the bounds that the plan states.
     """
     every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
     simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})
@@ -65,7 +65,7 @@ def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list
 
 
 def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdict]:
-    """Yield the force balance of a sensor's skin under 2 N and, over a fluid, the balance of volume."""
+    """Yield checks of a sensor's skin under 2 N: balance of forces and, over a fluid, constant volume."""
     press = press_of(prepare(sensor, scene, 1, twin.plan(sensor, scene)), DEFAULT)
     state = press(2.0)
     carried = float(state.pressure_mpa.sum() * np.prod(state.grid.cell_mm))
@@ -87,7 +87,7 @@ def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
 def _pressed(
     poisson: float, thickness_mm: float, side_mm: float, cells: int, penalty: float, force_n: float
 ) -> SkinState:
-    """Return the state of a bonded layer, E = 1 MPa, under a paraboloid; its depth is counted from the apex."""
+    """Return the state of a bonded layer (E = 1 MPa) under a paraboloid; depth is that of the paraboloid's apex."""
 
     def given(value: float, unit: str = "mm") -> Quantity:
         return assumed(value, unit, "an exercise")

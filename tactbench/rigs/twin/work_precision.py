@@ -1,4 +1,4 @@
-"""The twin's work-precision diagram: error against seconds per recording, for rungs, grids and load tables."""
+"""Work-precision diagram of the twin: error against seconds per recording, for solvers, grids and load tables."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)
-"""Contacts of the default matrix: caps from the sharpest to the bluntest, and the flat of the force task."""
+"""Radii of the indenters: caps from the sharpest to the bluntest, and the flat surface of the force task."""
 LOADS = 12
-"""Loads at which readings are compared; drawn between the table's nodes, where interpolation errs most."""
+"""Number of loads at which readings are compared, drawn between a load table's nodes, where interpolation errs most."""
 GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
 NODES = (9, 11, DEFAULT.most_nodes, 32)
-"""Limits on the nodes of a load table; refinement ends earlier where noise hides the remaining error."""
+"""Largest numbers of nodes of the compared load tables; refinement ends earlier if noise hides the remaining error."""
 _REFERENCE = RUNGS["reference"]
 
 
 def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
     """Return the jobs that measure the diagram of one sensor; every recording is timed `rounds` times.
 
-    A job raises the error of a rung that does not support the skin.
+    A job raises an error if its contact solver does not support the skin.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
         If the sensor cannot be simulated.
     """
     if sensor.spec.skin is None or sensor.transducer is None:
-        raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
+        raise RigError(f"{sensor.name} cannot be simulated.", hint="Declare a skin and a transducer in its plugin.")
     effects = rig_context(load_registry()).effects
     scenes = {radius: _planned(sensor, effects, radius) for radius in RADII_MM}
     truth: dict[float, FloatArray] = {}
@@ -73,7 +73,7 @@ def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
 
 
 def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
-    """Yield family, label and fidelity of every point to be measured."""
+    """Yield family, label and accuracy settings of every point of the diagram."""
     skin = sensor.spec.skin
     assert skin is not None
 
@@ -92,7 +92,7 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
 
 
 def _rung(fidelity: Fidelity) -> str:
-    """Return the name of the rung with this fidelity, or an empty string."""
+    """Return the name of the contact solver with these settings, or an empty string."""
     return next((name for name, own in RUNGS.items() if own == fidelity), "")
 
 
@@ -167,7 +167,7 @@ def _loads() -> FloatArray:
 
 
 def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
-    """Return the (loads, channels) changes of the reference, each load solved by itself."""
+    """Return the (loads, channels) changes from rest with the reference settings, each load solved by itself."""
     run = prepare(sensor, scene, 1, plan, _REFERENCE)
     run.fluid_pressure = "dc_pressure" in scene.observe
     press, read = pressed(run, names, _REFERENCE)
@@ -176,6 +176,6 @@ def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) 
 
 
 def _noise(sensor: SensorDescriptor, kind: ChannelKind) -> float:
-    """Return the standard deviation of white noise and rounding; infinity without any."""
+    """Return the standard deviation of white noise and rounding of a kind of channel; infinity if both are 0."""
     nuisances = sensor.spec.nuisances.get(kind)
     return math.inf if nuisances is None else nuisances.hidden() or math.inf

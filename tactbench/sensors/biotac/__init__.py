@@ -10,7 +10,7 @@ TACTBENCH_API = 2
 
 @hookimpl
 def tactbench_sensors() -> list[SensorDescriptor]:
-    """Offer the sensor."""
+    """Return the descriptor of the BioTac."""
     return [
         SensorDescriptor(
             spec=SPEC,

@@ -25,7 +25,7 @@ FRAME = Source(
     reference="kth-ros-pkg/biotac_driver: default frame of 44 commands at 4400 samples/s, every second one PAC",
 )
 CONVERTER_TOP = 4095.0
-"""12-bit converter; source: kth-ros-pkg/biotac_driver."""
+"""Largest reading [count] of the BioTac's 12-bit converter; source: kth-ros-pkg/biotac_driver."""
 
 # One table of electrodes is in TAMS-Group/biotac_gazebo_plugin (``sim_biotac.h``) and clear-nus/biotac_driver
 # (``biotac_logger_v3.py``): millimetres, x towards the tip, -z towards the pad, outward normals.
@@ -37,7 +37,7 @@ TABLE = Source(
 
 
 class Electrode(NamedTuple):
-    """One electrode; millimetres."""
+    """Position [mm] and outward normal of one electrode."""
 
     x_mm: float
     y_mm: float
@@ -77,10 +77,10 @@ ELECTRODES: tuple[Electrode, ...] = (
     Electrode(-9.800, 0.000, -5.080, _MIDLINE),
     Electrode(-13.600, 0.000, -5.080, _MIDLINE),
 )
-"""Electrodes 1 to 19, in order."""
+"""The BioTac's electrodes 1 to 19, in order of their numbers."""
 
 NAMES: tuple[str, ...] = tuple(f"E{number}" for number in range(1, len(ELECTRODES) + 1))
-"""Their channels' names, in the same order."""
+"""Names of the electrodes' channels, E1 to E19, in order of their numbers."""
 
 REST_COUNTS: tuple[float, ...] = (
     2796.2, 3356.0, 3374.1, 2974.3, 3329.6, 2849.4, 3086.9, 3153.5, 3153.5, 3236.7,
@@ -89,8 +89,8 @@ REST_COUNTS: tuple[float, ...] = (
 """Readings of E1 to E19 without contact, computed by the conduction model for the film at rest on the spec's default
 grid; a test recomputes them.
 
-Not the measured levels electrode by electrode (no source lists them): the twin adds the model's change to these, so
-both must come from one model. Their median is the measured one; their spread is the model's own answer; see
+These are not the measured levels of single electrodes, which no source lists: the twin adds the model's change to them,
+so both must come from one model. Their median is the measured median; their spread is that of the model; see
 ``docs/sensors.md``.
 """
 _REST_FROM = (
@@ -177,4 +177,4 @@ STREAMS: tuple[StreamSpec, ...] = (
     ),
     StreamSpec(name="vibration", rate_hz=2200.0, rate_source=FRAME, dtype="uint16", channels=(_PAC,)),
 )
-"""One stream per clock: a frame of 10 ms holds every channel once and PAC 22 times."""
+"""Streams of the BioTac, one per rate: a frame of 10 ms holds every channel once and PAC 22 times."""

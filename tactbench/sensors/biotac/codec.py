@@ -1,12 +1,12 @@
-"""The BioTac's words on SPI: commands, replies and properties to bytes and back.
+"""Conversion of the BioTac's SPI commands, replies and properties to bytes and back.
 
 Two public sources state the protocol and agree where not stated otherwise: [driver] kth-ros-pkg/biotac_driver,
 ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual] the SynTouch BioTac SP
-product manual of 26 Oct 2015, which says that the BioTac speaks the same protocol. Never tested with a real sensor.
+product manual of 26 Oct 2015, which states the same protocol for the BioTac. Never tested with a real sensor.
 
 SPI mode 0, most significant bit first, select active low, 500 kHz to 10 MHz [sourced: both]. The host sends a command
-of two bytes, deselects for 50 us, selects again and clocks the reply out. Every byte but a property's is seven bits and
-an odd parity.
+of two bytes, deselects for 50 us, selects again and clocks the reply out. Every byte, except those of properties, is
+seven bits and an odd parity bit.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ INDEX: dict[str, int] = {
 """Number of each channel in a sampling command [sourced: driver; Hall on some models, E20 to E24 on the SP: manual]."""
 
 NAMES: dict[int, str] = {index: name for name, index in INDEX.items()}
-"""The same turned round."""
+"""Name of the channel for each number in a sampling command."""
 
 STREAMING_INDEX = 16
-"""Switches a sensor to the streaming of protocol 1.1, left only after 5 s without a clock [sourced]: never sent."""
+"""Number that switches a sensor to the streaming of protocol 1.1, which ends only after 5 s without clock [sourced]."""
 
 CHANNELS: tuple[str, ...] = tuple(channel.name for stream in STREAMS for channel in stream.channels)
-"""The channels of the model with 19 electrodes, in the order of the spec's streams."""
+"""Names of the channels of a BioTac with 19 electrodes, in the order of the spec's streams."""
 
 RESEND = b"\x20\x00"
-"""Asks for the last two bytes once more. The driver has 20; the manual prints 50, of even parity, against its own
-rule, so 20 is sent [derived]."""
+"""Command to repeat the last two bytes. The driver has 20; the manual prints 50, of even parity, against its own rule,
+so 20 is sent [derived]."""
 
 READ, WRITE = 0x61, 0x40
 """First byte of a command that reads or writes a property [sourced: both; writing: manual]."""
 
 ERROR = 0xA5
-"""First byte of an error reply [sourced: both]. Its parity is even, so none is a valid datum [derived]."""
+"""First byte of an error reply [sourced: both]. Its parity is even, so that no valid datum begins with it [derived]."""
 
 ERRORS: dict[int, str] = {
     0x45: "parity of the command",
@@ -62,7 +62,7 @@ ERRORS: dict[int, str] = {
     0x52: "parameter is read-only",
     0x57: "error while writing",
 }
-"""Second byte of an error reply [sourced: driver; the manual has 2D, 58 and 52]."""
+"""Meanings of the second byte of an error reply [sourced: driver; the manual has 2D, 58 and 52]."""
 
 
 PROPERTIES: dict[str, tuple[int, int]] = {
@@ -72,27 +72,27 @@ PROPERTIES: dict[str, tuple[int, int]] = {
     "cpu speed": (0x61, 2),
     "sampling frequency": (0x70, 2),
 }
-"""Code and number of bytes; all are read-only and sent without parity [sourced: manual, table 10; driver]."""
+"""Property -> code, number of bytes; all are read-only and sent without parity [sourced: manual, table 10; driver]."""
 
 
 class Fault(StrEnum):
-    """Faults of one reply."""
+    """Faults that a reply of the sensor may have."""
 
     PARITY = "parity"
     RESERVED = "reserved bits"
-    """Parity holds, but a bit that is always 0 is not."""
+    """The parity is right, but a bit that must be 0 is 1."""
     ERROR = "error reply"
     NOT_CONNECTED = "not connected"
-    """The line was held low or high throughout: 00 00 or FF FF, both of bad parity."""
+    """The data line was low or high throughout: 00 00 or FF FF, both of wrong parity."""
     NO_REPLY = "no reply"
-    """Fewer than two bytes came."""
+    """Fewer than two bytes were received."""
 
 
 class Reply(NamedTuple):
-    """One word from the sensor."""
+    """Datum and fault of one reply from the sensor, a word of two bytes."""
 
     value: int | None
-    """0 to 4095 as received, wrong by a bit under PARITY and RESERVED; None where no datum came."""
+    """Count, 0 to 4095, as received: with the faults PARITY and RESERVED some bit is wrong; None without a datum."""
     fault: Fault | None = None
 
 
@@ -102,20 +102,20 @@ def with_parity(payload: int) -> int:
 
 
 def parity_holds(byte: int) -> bool:
-    """Return whether the number of ones is odd."""
+    """Return True if the number of ones in the byte is odd."""
     return byte.bit_count() % 2 == 1
 
 
 def sampling_command(index: int) -> bytes:
-    """Return the two bytes that sample channel `index`: ``1SSSSSSP`` and one that is ignored, 00 as in the driver.
+    """Return the two bytes that sample channel `index`: ``1SSSSSSP``, and an ignored byte 00 as in the driver.
 
     Raises
     ------
     ValueError
-        Outside 0 to 63, or for 16, which is no channel: see :data:`STREAMING_INDEX`.
+        If `index` is outside 0 to 63, or is 16, which is no channel: see :data:`STREAMING_INDEX`.
     """
     if not 0 <= index <= 63 or index == STREAMING_INDEX:
-        raise ValueError(f"no channel has the number {index}: 0 to 63 without {STREAMING_INDEX}")
+        raise ValueError(f"channel number {index} does not exist; 0 to 63 except {STREAMING_INDEX} is expected")
     return bytes([with_parity(0x40 | index), 0x00])
 
 
@@ -130,10 +130,10 @@ def encoded(count: int) -> bytes:
 
 
 def decoded(word: bytes) -> Reply:
-    """Return what a reply says; any bytes are read, none raises.
+    """Return the count and fault of a received reply; no bytes raise an error.
 
-    A datum whose first byte became A5 on the line looks like an error reply if 58 follows, and like bad parity
-    otherwise: flagged either way.
+    A datum whose first byte changed to A5 on the line is taken for an error reply if 58 follows, and otherwise for
+    wrong parity: it has a fault either way.
     """
     if len(word) != 2:
         return Reply(None, Fault.NO_REPLY)
@@ -151,7 +151,7 @@ def decoded(word: bytes) -> Reply:
 def property_text(name: str, raw: bytes) -> str | None:
     """Return flex version, software version or serial number as the maker's tools show it.
 
-    None if the bytes clocked out are none, as from a sensor that is not there; those after its length do not count.
+    None if the bytes are not a property, as from an absent sensor; bytes beyond the property's length are ignored.
     """
     _, length = PROPERTIES[name]
     raw = raw[:length]

@@ -1,4 +1,4 @@
-"""Driver of the BioTac: batches of SPI transfers in, blocks of counts out.
+"""Driver of the BioTac: sends batches of SPI transfers and returns blocks of counts.
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
 every byte. An SPI bridge (``spi://bridge/…``, a microcontroller that carries out batches by itself, ``docs/links.md``)
@@ -6,7 +6,7 @@ keeps the time of 4400 words a second; the machine's own SPI (``spi://spidev/…
 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
 4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`). Some batches are
-under way ahead of the one that runs, so that the host may be late by as many frames.
+sent ahead of the running one, so that the host may be late by as many frames.
 
 **Times.** A bridge stamps each batch with its own microseconds: `device_ns` of a row is that stamp, counted on over its
 wraps, and the word's place in the batch; `t_ns` is when the reply was in the host, the same for all rows of a batch.
@@ -67,11 +67,11 @@ from tactbench.sensors.biotac.frames import FrameBatches, streams_of
 from tactbench.sensors.biotac.options import BioTacOptions
 
 PATIENCE_S = 0.5
-"""Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""
+"""Seconds (assumed) after the end of a batch until its reply counts as lost. USB and a busy host take less."""
 
 
 class BioTacDriver(Driver):
-    """One BioTac.
+    """Driver of one BioTac on an SPI bus.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ class BioTacDriver(Driver):
     Raises
     ------
     UsageError
-        For options that are not known.
+        If an option is unknown.
     RigError
-        If the link is no SPI link, or its clock is not one for a BioTac, or leaves no time for so many resends.
+        If the link is no SPI link, or its clock is out of a BioTac's range or too slow for the resends.
     LinkError
         If the link cannot be opened.
     """
@@ -100,9 +100,9 @@ class BioTacDriver(Driver):
             slowest, fastest = SLOWEST_CLOCK.to("Hz"), FASTEST_CLOCK.to("Hz")
             if not slowest <= self._link.speed_hz <= fastest:
                 raise RigError(
-                    f"{self._link.address} runs at {self._link.speed_hz} Hz, a BioTac takes {slowest:g} to {fastest:g} "
-                    "Hz.",
-                    hint="Choose speed_hz=4400000, or the next that the adapter has below.",
+                    f"{self._link.address} runs at {self._link.speed_hz} Hz; {slowest:g} to {fastest:g} Hz is expected "
+                    "for a BioTac.",
+                    hint="Choose speed_hz=4400000, or the adapter's next lower clock.",
                 )
             self._set_up()
         except RigError:
@@ -110,7 +110,7 @@ class BioTacDriver(Driver):
             raise
 
     def _set_up(self) -> None:
-        """Begin at position 0 with nothing under way."""
+        """Reset the driver to frame position 0 and no pending batches."""
         options = self._options
         try:
             self._batches = FrameBatches(
@@ -132,17 +132,17 @@ class BioTacDriver(Driver):
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The spec's streams, or those channels of theirs that the frame has, at its rates."""
+        """The spec's streams, limited to the channels in the option `frame`, at that frame's rates."""
         rate_hz = COMMAND_RATE.to("Hz")
         source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self._options.frame)}")
         return streams_of(self._options.frame, rate_hz, source)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when requested again.
+        """Numbers of faults by name and channel, as ``parity E7``; ``resent E7``: words without fault in a repetition.
 
-        Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
-        the batch before) and ``frames not requested`` (that would have had their time in between).
+        Further names are ``batches lost`` (without reply), ``batches late`` (begun more than a word's time after the
+        end of the previous batch) and ``frames not requested`` (whose time passed in this pause).
         """
         return dict(self._counts + self._batches.counts)
 
@@ -152,7 +152,7 @@ class BioTacDriver(Driver):
         Raises
         ------
         RigError
-            If no serial number that begins with BT is read: there is no BioTac; or while it samples.
+            If the serial number read does not begin with BT, or the sensor is sampling.
         LinkTimeout, LinkUnplugged, LinkError
             If the adapter does not answer.
         """
@@ -167,9 +167,9 @@ class BioTacDriver(Driver):
             text = property_text(name, raw)
             if text is None and name == "serial number":
                 raise RigError(
-                    f"No BioTac answers at {self._link.address}, select lines {self._options.select:#x}: its serial "
-                    f"number reads {raw.hex(' ')}, expected is a text that begins with BT.",
-                    hint="Check supply, wiring and the option select.",
+                    f"No BioTac answers at {self._link.address}, select lines {self._options.select:#x}: the serial "
+                    f"number was read as bytes {raw.hex(' ')}; a text that begins with BT is expected.",
+                    hint="Check supply, wiring and the option `select`.",
                 )
             found[name] = raw.hex(" ") if text is None else text
         if isinstance(self._link, SpiBridge):
@@ -186,7 +186,7 @@ class BioTacDriver(Driver):
                 return reply.data[1]
 
     def start(self) -> None:
-        """Send the first batches; sequence numbers begin at 0, times by the adapter's counter where that stands."""
+        """Send the first batches; sequence numbers begin at 0, device times at the present count of the adapter."""
         if not self._running:
             self._counts = Counter(self.counts)
             self._set_up()
@@ -199,9 +199,9 @@ class BioTacDriver(Driver):
             self._sent.append((self._link.send(steps), first))
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the frames that are over; see :class:`Driver`. Nothing while it is stopped.
+        """Return the samples of the frames that have ended; see :class:`Driver`. When stopped, return an empty list.
 
-        An adapter without a program of its own carries out a batch in here: then it takes a batch's time at least.
+        With an adapter that cannot run batches by itself, the call runs one and takes at least the batch's time.
         """
         if not self._running:
             return []
@@ -217,7 +217,7 @@ class BioTacDriver(Driver):
         return self._batches.blocks()
 
     def _give_up_lost(self) -> None:
-        """Drop what is under way if nothing has come for longer than all of it can take."""
+        """Drop all pending batches if no reply has come for longer than they can take together."""
         due_ns = self._ahead * self._batches.timing(0)[1] + round(PATIENCE_S * 1e9)
         if self._clock() - self._received_ns > due_ns:
             self._link.abandon()
@@ -236,7 +236,7 @@ class BioTacDriver(Driver):
         self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
 
     def _answered(self, reply: SpiReply) -> int | None:
-        """Return the first position of the batch that `reply` is to; those before it are lost. None: to none."""
+        """Return the first position of the batch that `reply` belongs to (None: no batch); earlier batches are lost."""
         if reply.number not in (number for number, _ in self._sent):
             return None
         while True:
@@ -246,7 +246,7 @@ class BioTacDriver(Driver):
             self._counts["batches lost"] += 1
 
     def _begun_us(self, counter_us: int, first: int) -> int:
-        """Return when a batch began by the adapter's counter, counted on; count frames not requested before it."""
+        """Return a batch's start [us] by the adapter's counter without wraps; count frames not requested before it."""
         if self._last is None:
             begun_us = counter_us
         else:
@@ -263,7 +263,7 @@ class BioTacDriver(Driver):
         return begun_us
 
     def stop(self) -> None:
-        """Wait for what is under way and drop it."""
+        """Wait for the replies to all pending batches and drop them."""
         if not self._running:
             return
         self._running = False
@@ -273,6 +273,6 @@ class BioTacDriver(Driver):
         self._link.abandon()
 
     def close(self) -> None:
-        """Stop and close the link."""
+        """Stop sampling and close the link to the adapter."""
         self.stop()
         self._link.close()

@@ -1,4 +1,4 @@
-"""Emulator of a BioTac on SPI; it maps received bytes to sent bytes at given times.
+"""Emulator of a BioTac on an SPI bus: a function from received bytes and times to sent bytes.
 
 Written from the public sources of :mod:`tactbench.sensors.biotac.codec`, never compared with a real sensor. No source
 states the order in which a sensor checks parity, command and channel, what it puts on the line during a command, what
@@ -38,11 +38,11 @@ _ROUNDING_S = 1e-9
 """Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""
 
 _IDLE = b"\xff"
-"""Level of the line while the sensor does not drive it [assumed: high]."""
+"""Byte that the host reads while the sensor does not drive the data line [assumed: high]."""
 
 _FILLERS = (0x00, 0x01)
-"""First byte that a host sends while it reads: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual, and a public
-bridge for a PIC32]."""
+"""First bytes that a host may send while it reads a reply: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual,
+and a public bridge for a PIC32]."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class BioTacFault(Fault):
     Raises
     ------
     UsageError
-        As of every fault, for a channel that no BioTac has, or an `error` that is no byte.
+        For the reasons of every Fault, for a channel that no BioTac has, or an `error` outside 0 to 255.
     """
 
     known: ClassVar[Mapping[str, str]] = {
@@ -65,31 +65,31 @@ class BioTacFault(Fault):
     }
 
     channels: frozenset[str] = frozenset()
-    """Affected channels; empty: all of them."""
+    """Names of the channels that have the fault; empty: all channels."""
     error: int = 0x2E
-    """Second byte of an error reply."""
+    """Second byte of the error reply that the fault causes."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         unknown = sorted(self.channels - set(INDEX))
         if unknown:
             raise UsageError(
-                f"The fault {self.name!r} is of {', '.join(unknown)}, which no BioTac has.",
-                hint=f"Channels are {', '.join(INDEX)}.",
+                f"The fault {self.name!r} names the channels {', '.join(unknown)}, which no BioTac has.",
+                hint=f"Choose from {', '.join(INDEX)}.",
             )
         if not 0 <= self.error <= 0xFF:
-            raise UsageError(f"The fault {self.name!r} has the error {self.error}.", hint="It is a byte, 0 to 255.")
+            raise UsageError(f"The fault {self.name!r} has the error code {self.error}.", hint="Give a byte, 0 to 255.")
 
 
 @dataclass
 class _Answer:
     data: bytes
-    """Bytes that the host receives."""
+    """Bytes that the host receives as the answer to a command."""
     word: bytes = b""
-    """Word that a resend repeats; empty: none."""
+    """Word that a resend command repeats; empty if no word was sent."""
     channel: str = ""
     early: int | None = None
-    """Second byte of the error that is sent instead before `ready_s`."""
+    """Second byte of the error reply that is sent instead of the data if read before `ready_s`."""
     ready_s: float = -math.inf
     sent: int = 0
 
@@ -97,26 +97,26 @@ class _Answer:
 REST: Mapping[str, float] = {
     channel.name: channel.rest.value for stream in STREAMS for channel in stream.channels if channel.rest is not None
 }
-"""Counts of the spec's channels at rest."""
+"""Readings [count] of the BioTac's channels at rest."""
 
 DEFAULT_PROPERTIES: Mapping[str, bytes] = {
     "flex version": b"BD",
     "software version": b"0238",
     "serial number": b"BT2P0220B11E0004",
 }
-"""Properties of the maker's examples [sourced: QuickStart Guide]."""
+"""Bytes of the sensor's properties, as in the maker's examples [sourced: QuickStart Guide]."""
 
 
 class Emulator(SpiDeviceEmulator):
     """Emulated BioTac on an SPI bus.
 
-    A sampling command samples at its last bit; the word is read after the pause. Several sensors that are selected
-    together are several emulators that get the same bytes.
+    A sampling command samples at its last bit; the word is read after the pause. For several sensors that are selected
+    together, use several emulators with the same bytes.
 
-    `senses` maps a second to counts of the channels, rounded and clipped to 0-4095; those left out are at rest (None:
-    all). The sensor has E1 to E19, PDC, TDC, TAC and PAC, and what else is given: E20 to E24 on an SP. A property that
-    is left out is unknown to it. All lines of the mask `select` must be active for it to receive. `clock_hz` is that of
-    the bus, and determines the duration of a byte. `faults` may be changed at any time.
+    `senses` maps a time [s] to counts of channels, rounded and clipped to 0-4095; channels left out are at rest (None:
+    all). The sensor has E1 to E19, PDC, TDC, TAC and PAC, and further channels given (E20 to E24 on an SP). It has only
+    the properties given. It receives bytes only if all lines of the mask `select` are active. `clock_hz` is the clock
+    of the bus, and determines the duration of a byte. `faults` may be changed at any time.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class Emulator(SpiDeviceEmulator):
         return _IDLE * 2 + self._read(len(data) - 2, end_s)
 
     def _shown(self, name: str, channel: str, now_s: float) -> list[BioTacFault]:
-        """Return the faults called `name` that concern the next word of `channel`."""
+        """Return the faults called `name` that affect the next word of `channel` at `now_s`."""
         return [
             fault
             for fault in self.faults
@@ -214,14 +214,14 @@ class Emulator(SpiDeviceEmulator):
         return answer
 
     def _resend(self, now_s: float) -> _Answer:
-        """Return the last two bytes that were sent, errors among them [assumed], without a pause [assumed]."""
+        """Return the last two bytes sent, which may be an error reply [assumed]; no pause is needed [assumed]."""
         if self._last is not None:
             return self._word(self._last.word, self._last.channel, now_s)
         # As the driver has it; the manual says that such a request is ignored.
         return self._error(0x5F)
 
     def _word(self, word: bytes, channel: str, now_s: float) -> _Answer:
-        """Return the answer with a word, after applying faults of the line; a resend repeats the word without them."""
+        """Return the answer with `word` after faults of the line; a resend repeats the word without these faults."""
         answer = _Answer(word, word, channel)
         if self._shown("doubled-reply", channel, now_s) and self._last is not None:
             answer.data = self._last.word
@@ -238,15 +238,15 @@ class Emulator(SpiDeviceEmulator):
 
 
 def build_emulator(settings: EmulatorSettings) -> Emulator:
-    """Return a sensor with the given senses, as ``SensorDescriptor.emulator`` promises; it uses no random numbers.
+    """Return the emulator for `settings`, as ``SensorDescriptor.emulator`` requires; it uses no random numbers.
 
-    The clock of the bus is unknown here; with the fastest one that a sensor allows, no pause of 50 us is too short;
-    at 4.4 MHz it samples 2 us early and lets a pause pass that is 2 us too short.
+    The clock of the bus is unknown here, and assumed to be the fastest that a sensor allows, so that no pause of 50 us
+    is too short; at 4.4 MHz the emulator samples 2 us early and accepts a pause that is 2 us too short.
 
     Raises
     ------
     UsageError
-        For options or faults that are not known.
+        If an option or a fault is unknown.
     """
     options = read_options(BioTacOptions, settings.options, "biotac")
     faults = [BioTacFault.parse(text) for text in settings.faults]

@@ -1,4 +1,4 @@
-"""The grid of the conduction in the fluid film, and the middle surface of the film."""
+"""Grid on which the current in the BioTac's fluid film is computed, and the film's middle surface."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.meshes import RAYS_FROM_MM, core_reach_mm
 
 REFINEMENT = 2
-"""Refinement of the conduction's grid relative to the skin's."""
+"""Refinement step of the grid for conduction in the film, relative to the grid of the skin."""
 _CELLS_PER_STEP = 0.75, 0.515
-"""Conduction cells along and across, for one of the skin's and one step: about square on the film, whose arc is shorter
-than the outer surface's. At two steps, 96 x 66 cells, changes are off by 0.6 % of their rms; at three, by 0.5 %."""
+"""Conduction cells along and across per cell of the skin and refinement step: about square on the film, whose arc is
+shorter than the skin's. At step 2, 96 x 66 cells, reading changes are off by 0.6 % of their rms; at 3, by 0.5 %."""
 
 
 def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
-    """Return the same sheet in the conduction's cells; centres of cells, not nodes."""
+    """Return the grid for conduction in the film on the sheet of the skin's `grid`; points are centres of cells."""
     along, across = (
         max(2, round(axis.size * factor * cells))
         for axis, cells in zip((grid.x_mm, grid.s_mm), _CELLS_PER_STEP, strict=True)
@@ -25,7 +25,7 @@ def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Return the (n+1,) edges of cells of equal length."""
+    """Return the (n+1,) edges of cells of equal length with the (n,) `centres`."""
     half = float(centres[1] - centres[0]) / 2
     return np.concatenate([centres - half, centres[-1:] + half])
 
@@ -37,12 +37,12 @@ def _divided_axis(centres: FloatArray, cells: int) -> FloatArray:
 
 
 def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> FloatArray:
-    """Return the matrix that takes n cell-centred samples to `cells` cells on the same length.
+    """Return the (cells, n) matrix that interpolates n cell-centred samples to `cells` cells on the same length.
 
     It is the Dirichlet kernel, that is a zero-padded Fourier transform with the shift between the cells' centres
-    (which do not coincide), written as a (cells, n) matrix for an even n: two small products do both axes. Rows sum to
-    1; it is exact for every wave below the Nyquist one. `mirrored` samples go on as their own image at both ends,
-    others are periodic.
+    (which do not coincide), for an even n: two small products interpolate along both axes. Rows sum to 1; waves below
+    the Nyquist wave are interpolated exactly. `mirrored` samples continue as their own image at both ends, others are
+    periodic.
     """
     fine = (np.arange(cells) + 0.5) * (n / cells)
     coarse = np.arange(n) + 0.5
@@ -72,5 +72,5 @@ def mid_film_mm(
 
 
 def core_mm(from_mm: FloatArray, ray_rad: FloatArray, angle_rad: FloatArray) -> FloatArray:
-    """Return :func:`core_reach_mm` of places, rays and angles, which broadcast."""
+    """Return the reach [mm] of the core (:func:`core_reach_mm`) for arrays of places, rays and angles (broadcast)."""
     return np.asarray(np.frompyfunc(core_reach_mm, 3, 1)(from_mm, ray_rad, angle_rad), dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
+"""Frames of the BioTac: the words to send and their times, and conversion of replies to samples of two streams.
 
-No input or output, no clock of its own: the driver of the bus takes the next batch, sends it, and returns what
-was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
+The module does no input or output and reads no clock: the driver takes the next batch, sends it, and returns the bytes
+received. Nothing is interpolated: a sample that was not received is marked missing.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 DEFAULT_FRAME: tuple[str, ...] = tuple(
     name for slow in (*NAMES, "PDC", "TAC", "TDC") for name in (slow, "PAC")
 )  # fmt: skip
-"""44 commands, every second one PAC [sourced: kth-ros-pkg/biotac_driver, BT_FRAME_STRUCTURE_DEFAULT]."""
+"""Channels of the default frame, every second PAC [sourced: kth-ros-pkg/biotac_driver, BT_FRAME_STRUCTURE_DEFAULT]."""
 
 FILLER = b"\x00\x00"
-"""Sent while a word is read [sourced: driver]."""
+"""Bytes that the host sends while it reads a word [sourced: driver]."""
 
 
 def quality_of(reply: Reply) -> Quality:
-    """Return what is wrong with a reply as a sample.
+    """Return the quality flags of a sample from a reply.
 
-    A word of bad parity keeps the number that came and is SUSPECT: at least one of its bits is wrong. Without a datum a
-    sample is MISSING; at either end of the converter it is SATURATED.
+    A word of wrong parity keeps its count and is SUSPECT: at least one of its bits is wrong. A sample without datum is
+    MISSING; a count at either end of the converter's range is SATURATED.
     """
     if reply.value is None:
         return Quality.MISSING
@@ -54,9 +54,9 @@ def quality_of(reply: Reply) -> Quality:
 
 
 def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
-    """Return the spec's streams as a frame fills them: with its channels only, at its rates.
+    """Return the spec's streams limited to the channels of `frame`, at the frame's rates.
 
-    `rate_hz` is of commands (None: not stated), `source` that of rates that are not the spec's.
+    `rate_hz` is the rate of commands (None: not stated), `source` the source of rates that differ from the spec's.
     """
     found = []
     for stream in STREAMS:
@@ -82,11 +82,11 @@ class _Row:
 
 
 class FrameRows:
-    """Gathers words, in the order of a frame, into rows of its streams.
+    """Collector of received words, in the order of a frame, into rows of the sensor's streams.
 
-    The k-th word of a channel within a frame belongs to the k-th of that stream's rows. A row ends when all of its
-    words are there or a word of another row comes; words that did not come are MISSING. A row of which no word came is
-    absent: a gap in the sequence numbers. A frame is the names of channels in the order of their commands.
+    The k-th word of a channel within a frame belongs to the k-th row of the channel's stream. A row ends when all its
+    words have been received or a word of another row is; its other words are MISSING. A row without any word is absent:
+    a gap in the sequence numbers. A frame is the names of channels in the order of their commands.
     """
 
     def __init__(self, frame: tuple[str, ...]) -> None:
@@ -144,12 +144,12 @@ class FrameRows:
             self._open[k] = None
 
     def close(self) -> None:
-        """End every row that is begun."""
+        """End all incomplete rows; words not received are marked MISSING."""
         for k in range(len(self._streams)):
             self._close(k)
 
     def blocks(self) -> list[Block]:
-        """Return the rows that ended since the last call, a block a stream that has any.
+        """Return the rows that ended since the last call, in one block for each stream with such rows.
 
         A row of ``electrodes`` is one frame. Its times are those of the frame's first command but PAC; in the default
         frame the others follow every 454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
@@ -176,27 +176,27 @@ def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
 
 
 class FrameBatches(FrameRows):
-    """Batches of SPI steps for one sensor, and rows from their replies.
+    """Source of the batches of SPI steps for one sensor, and collector of rows from their replies.
 
     A word is a sampling command, the pause, two bytes read, and a pause that fills its time. SPI adapters take whole
-    microseconds, so the pauses differ by one: the time of n words is n / 4400 s to 1 us, whatever the SPI clock.
+    microseconds, so the pauses differ by 1 us: the time of n words is n / 4400 s to 1 us, whatever the SPI clock.
 
-    A resend repeats the last two bytes, so it must come before the next command; and what a batch does cannot depend on
-    what it reads. So with `resends` above 0 *every* word is requested so many times more, and the first that came good
-    is taken. By default there is none: a word of bad parity is SUSPECT and counted. No source states which pause a
-    resend needs; 50 us as after a sampling command is assumed, and there is time for one at 4400 words a second.
+    A resend repeats the last two bytes, so it must come before the next command; and a batch cannot depend on the bytes
+    that it reads. So with `resends` above 0 *every* word is requested as many times again, and the first word without
+    fault is used. By default there is no resend: a word of wrong parity is SUSPECT and counted. No source states the
+    pause for a resend; 50 us as after a sampling command is assumed, which allows one resend at 4400 words a second.
 
     The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
     repeats the word before it cannot be recognised by its bytes.
 
-    `speed_hz` is the clock of the SPI bus, `select` the mask of the sensor's select lines, `words` those in a batch
-    (None: a frame).
+    `speed_hz` is the clock of the SPI bus, `select` the mask of the sensor's select lines, `words` the number of words
+    in a batch (None: a frame).
 
     Attributes
     ----------
     counts
-        Faults of the first replies to commands by fault and channel, as ``parity E7``, and ``resent E7`` for words that
-        came good in a repetition only.
+        Numbers of faults in the first replies to commands by fault and channel, as ``parity E7``, and ``resent E7`` for
+        words without fault in a repetition only.
 
     Raises
     ------
@@ -227,17 +227,17 @@ class FrameBatches(FrameRows):
         if self._paused_us(1) < self._within_us + self._word_us:
             raise ValueError(
                 f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
-                f"fit into a word's 1/{rate_hz} s"
+                f"fit into the time of a word, 1/{rate_hz} s"
             )
         self.counts: Counter[str] = Counter()
 
     def _paused_us(self, words: int) -> int:
-        """Return the sum of pauses in the first `words` words, rounded down."""
+        """Return the sum [us] of the pauses in the first `words` words, rounded down."""
         over, under = self._pauses_us
         return words * over // under
 
     def next(self) -> tuple[int, list[SpiStep]]:
-        """Return the position of the next batch's first word, counted over all frames, and the batch."""
+        """Return the position of the next batch's first word, counted over all frames, and the batch's SPI steps."""
         first, steps = self._position, []
         self._position += self._words
         for n in range(first, self._position):
@@ -250,9 +250,9 @@ class FrameBatches(FrameRows):
         return first, steps
 
     def timing(self, first: int) -> tuple[list[int], int]:
-        """Return when the words of the batch whose first has position `first` are sampled, and when it is over.
+        """Return the sampling times of the words in the batch from position `first` on, and the batch's end.
 
-        Nanoseconds from the batch's beginning; a word is sampled at the last bit of its command [assumed].
+        Times are nanoseconds from the batch's beginning; a word is sampled at its command's last bit [assumed].
         """
         over, under = 16 * 1_000_000_000, self._speed_hz
         begins = [
@@ -267,9 +267,9 @@ class FrameBatches(FrameRows):
         """Take the `data` that came in at `t_ns` during the steps of the batch with position `first`.
 
         `device_ns` is the beginning of the batch by the adapter's own counter. With it, rows have this clock's times
-        beside `t_ns`; without it, `t_ns` is taken for the batch's end and rows have the times before it at which they
-        were sampled if no pause was longer than requested. `skipped` words were not requested in their time so far, as
-        whole frames: sequence numbers stay with the time.
+        beside `t_ns`; without it, `t_ns` counts as the batch's end and rows have the times before it at which they
+        were sampled if no pause was longer than requested. `skipped` is the number of words so far (whole frames) not
+        requested in their time: sequence numbers skip these frames, too.
         """
         sampled_ns, end_ns = self.timing(first)
         stride = 2 * self._commands
@@ -285,9 +285,9 @@ class FrameBatches(FrameRows):
             )
 
     def _reply(self, channel: str, words: Sequence[bytes]) -> Reply:
-        """Return the first reply, or the first good one of the others if its parity was bad.
+        """Return the first reply to a command or, if its parity was wrong, the first repetition without fault.
 
-        What never came is not taken from a resend: if the command was lost, the last two bytes are another channel's.
+        A missing reply is not replaced by a resend: if the command was lost, the last two bytes are another channel's.
         """
         reply = decoded(words[0])
         if reply.fault is not None:

@@ -1,8 +1,8 @@
-"""Core, film and outer surface by the public meshes: tables and formulas, without array libraries.
+"""Shapes of the BioTac's core, film and outer surface from the public meshes, as tables and formulas.
 
-The electrodes' frame: x along the finger towards the tip, the pad at -z. Up to x = 1.8 mm what faces a point of the
-core is what lies radially above it; beyond, what lies on the ray from (1.8 mm, axis) through it. The sheet's own axial
-coordinate is that of the finger's outer surface.
+Coordinates are those of the electrodes: x along the finger towards the tip, the pad at -z. Up to x = 1.8 mm, distances
+from the core are radial; beyond, they lie on rays from the point x = 1.8 mm of the axis. The sheet's axial coordinate
+is that of the finger's outer surface.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ MESHES = (
     "axis points the other way"
 )
 CORE_MM = 5.33
-"""Radius of the core, cylinder and tip; MESHES."""
+"""Radius of the core's cylinder and tip, from the public meshes (MESHES)."""
 ELECTRODES_MM = 5.08
-"""Radius on which the electrode table lies, sqrt(3.513² + 3.670²): the electrodes are let in by the difference."""
+"""Radius on which the electrodes lie, sqrt(3.513² + 3.670²): smaller than the core's, as they are recessed into it."""
 RAYS_FROM_MM = 1.8
-"""Centre of the tip's rays, and of the core's tip: 1.8 + 5.33 = 7.13 mm, the meshes' 7.1."""
+"""Axial place of the centre of the tip's rays and the core's round tip, which ends at 1.8 + 5.33 mm (meshes: 7.1)."""
 _E7 = ELECTRODES[6]
 _AXIAL, _DOWN = _E7.normal[0], -_E7.normal[2]
 _FACET_MM = _AXIAL * (_E7.x_mm - RAYS_FROM_MM) - _DOWN * _E7.z_mm + CORE_MM - ELECTRODES_MM
-"""Distance from the rays' centre of the flat that the tip's electrodes are let into, as deep as the others."""
+"""Distance from the rays' centre to the flat with the tip's electrodes, which are recessed as deep as the others."""
 
 
 def sheet_x(x_mm: float, height_mm: float, outer_mm: float, dome_mm: float) -> float:
-    """Return the axial coordinate on the sheet that faces a point of the core at `x_mm`, `height_mm` from the axis.
+    """Return the sheet's axial coordinate [mm] opposite to a point of the core at `x_mm`, `height_mm` from the axis.
 
     `outer_mm` is the radius of the finger's outer surface, whose dome begins at `dome_mm`.
     """
@@ -40,21 +40,21 @@ def sheet_x(x_mm: float, height_mm: float, outer_mm: float, dome_mm: float) -> f
 
 
 def ray_on_sheet(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
-    """Return the sheet's axial coordinate where a ray meets the outer surface; 0 is straight up from the axis."""
+    """Return the sheet's axial coordinate [mm] where a ray ends at the outer surface; angle 0: normal to the axis."""
     return RAYS_FROM_MM + ray_length(angle_rad, outer_mm, dome_mm) * math.sin(angle_rad)
 
 
 def ray_length(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
-    """Return the length of a ray up to the outer surface."""
+    """Return the length [mm] of a ray of the tip up to the outer surface."""
     ahead = RAYS_FROM_MM - dome_mm
     # |(ahead + t sine, t cosine)| = outer radius, seen from the dome's centre.
     return math.sqrt(outer_mm**2 - (ahead * math.cos(angle_rad)) ** 2) - ahead * math.sin(angle_rad)
 
 
 def core_reach_mm(from_mm: float, ray_rad: float, angle_rad: float) -> float:
-    """Return the reach of the core along a ray from a place of the axis, up to RAYS_FROM_MM.
+    """Return the extent [mm] of the core along a ray from the place `from_mm` (at most RAYS_FROM_MM) on the axis.
 
-    `ray_rad` is the angle from straight up, `angle_rad` that around the finger.
+    `ray_rad` is the ray's angle from the perpendicular to the axis, `angle_rad` the angle around the finger.
     """
     # Where the ray meets the facet; away from it, where the facet bends back, the core's own radius.
     leaning = max(_AXIAL * math.sin(ray_rad) + _DOWN * math.cos(ray_rad) * math.cos(angle_rad), 1e-9)
@@ -78,8 +78,8 @@ AT_X_MM: dict[float, tuple[float, ...]] = {
     0: (1.24, 1.24, 1.15, 1.05, 0.93, 0.78, 0.61, 0.45, 0.26, 0.14),
     1: (1.53, 1.44, 1.23, 1.05, 0.88, 0.73, 0.56, 0.41, 0.24, 0.13),
 }  # fmt: skip
-"""Millimetres by axial place and angle, inner skin less core, left and right averaged (they differ by .011 mm on
-average); the meshes' edges of .6-.8 mm leave about .03 mm. -17.2 mm, the seal, is the law's: see SOURCE."""
+"""Film thickness [mm] by axial place [mm] and angle: inner skin less core, mean of left and right (they differ by
+.011 mm on average; error by the meshes' edges of .6-.8 mm: .03 mm). -17.2 mm, the seal, is computed: see SOURCE."""
 AT_RAY_DEG: dict[float, tuple[float, ...]] = {
     5: (2.04, 1.96, 1.69, 1.27, 0.92, 0.67, 0.53, 0.38, 0.23, 0.11),
     15: (2.32, 2.24, 2.01, 1.61, 1.12, 0.70, 0.52, 0.39, 0.26, 0.15),
@@ -91,7 +91,7 @@ AT_RAY_DEG: dict[float, tuple[float, ...]] = {
     75: (0.73, 0.73, 0.70, 0.65, 0.60, 0.52, 0.48, 0.45, 0.41, 0.38),
     85: (0.45, 0.46, 0.47, 0.46, 0.45, 0.44, 0.43, 0.44, 0.44, 0.42),
 }  # fmt: skip
-"""The same at the tip, by the ray's angle from straight down towards the tip."""
+"""Film thickness [mm] at the tip, by the ray's angle [deg] from straight down towards the tip."""
 _FILM_MM = (*AT_X_MM.values(), *AT_RAY_DEG.values())
 SOURCE = Source(
     tag="derived",
@@ -101,12 +101,12 @@ SOURCE = Source(
 
 
 def film_table(outer_mm: float, dome_mm: float) -> SheetTable:
-    """Return the meshes' film on a sheet with the radius `outer_mm`, whose dome begins at `dome_mm`."""
+    """Return the film thickness of the meshes on a sheet with the radius `outer_mm`, whose dome begins at `dome_mm`."""
     return SheetTable(x_mm=_places(outer_mm, dome_mm), angle_deg=ANGLES_DEG, value_mm=_FILM_MM, source=SOURCE)
 
 
 def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
-    """Return the distance of the outer surface inside cylinder and dome: core, film and a skin of one thickness."""
+    """Return the depth of the outer surface below cylinder and dome, for a skin of constant thickness over the film."""
     reach = [(x, 0.0, outer_mm) for x in AT_X_MM]
     for degrees in AT_RAY_DEG:
         ray = math.radians(degrees)
@@ -131,6 +131,6 @@ def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
 
 
 def _places(outer_mm: float, dome_mm: float) -> tuple[float, ...]:
-    """Return the sheet's axial coordinates of the rows."""
+    """Return the sheet's axial coordinates [mm] of the rows of both film tables."""
     rays = (ray_on_sheet(math.radians(angle), outer_mm, dome_mm) for angle in AT_RAY_DEG)
     return (*AT_X_MM, *rays)

@@ -2,8 +2,8 @@
 
 The figures are measured on public recordings of one BioTac (Alexis-Georganopoulos/Robotic-Finger, called RF), of
 another one sliding (dexrob/BioTac_slide_20_50, DX) and of three BioTac SP at rest (RuihanGao/BioTacSP_setup, RG).
-Warm-up, the history of contact and what is random between recordings are kept apart: rest levels are compared after the
-fitted warm-up is taken off, and 15 s or more after a contact. What hard presses leave for minutes is a scenario.
+Warm-up, effects of earlier contacts and random differences between recordings are separated: rest levels are compared
+without the fitted warm-up, and 15 s or more after a contact. After-effects of hard presses are a scenario.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ RANGES = ranges(
     ("taxel_creep_1_fraction", 0.0, 0.12, "1", "derived", "RF: 0.11-0.12 of the response remains after release"),
     ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "half of a pad; the paper does not say where its caps touch"),
 )
-"""Plausible ranges; factors refer to the values above."""
+"""Plausible ranges of the BioTac's nuisances; factors refer to the nuisances' default values."""
 
 HARD_HANDLED = Scenario(
     title="pressed hard for a minute, minutes before",
@@ -119,5 +119,5 @@ HARD_HANDLED = Scenario(
         ),
     },
 )
-"""Nuisances read off recordings with hard presses in between, warm-up included. A session of
-this kind has larger offsets than the usual one; its values bound from above what such handling does."""
+"""Scenario with nuisances measured between recordings with hard presses, warm-up included. The offsets are
+larger than in a usual session, and are an upper bound of the effect of such handling."""

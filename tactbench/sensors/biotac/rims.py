@@ -1,14 +1,14 @@
-"""Discs on a grid coarser than their rims: where current enters, between cell centres.
+"""Electrodes as discs whose rims are modelled more finely than the cells of the conduction grid.
 
-Under a disc the potential obeys ``div(h grad phi) = kappa (phi - V)`` with ``kappa = 3/h + 4/(pi a)``: it falls to the
-disc's own over the length ``lambda = sqrt(h / kappa)``, which under a closed film is a fifth of a cell. A cell that is
-covered in part would then count as covered altogether, and the disc would grow with the cell.
+Under a disc the potential obeys ``div(h grad phi) = kappa (phi - V)`` with ``kappa = 3/h + 4/(pi a)``: it nears the
+disc's own over the length ``lambda = sqrt(h / kappa)``, which under a closed film is a fifth of a cell. A cell covered
+in part would then count as fully covered, and the disc would grow with the cell size.
 
 So cells belong to a disc by their centres, and the plane solution across a straight rim, ``phi - V = q n.r / h``
 outside and ``(q / h) lambda exp(n.r / lambda)`` inside (up to ``lambda``'s own shift), is built into the
 conductances: a face across the rim, ``t`` of whose length is outside, conducts ``h w / (t + (lambda / n) (1 -
 exp(-(D - t) n / lambda)))``, and a cell inside beside the rim takes the current that makes this solution balance. Both
-tend to plain area weighting for thick films and to a fixed potential on the very rim for closed ones.
+tend to plain area weighting for thick films and to a fixed potential on the rim itself for closed films.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray, RigError
 
 _AXIS, _SIGN = np.array([0, 0, 1, 1]), np.array([[-1], [1], [-1], [1]])
-"""Axis and sign of a cell's four faces."""
+"""Axis (0: x, 1: s) and direction (-1, 1) of a cell's four faces."""
 _MOST_DECAYS = 9.0
-"""Decay lengths inside the rim beyond which a cell counts as joined perfectly: exp(9) is stiff enough."""
+"""Distance inside the rim, in decay lengths, beyond which a cell counts as connected without resistance."""
 _LEAST_WAY = 0.02
-"""A cell centre that lies on the rim is kept this share of a cell away from it."""
+"""Least distance between a cell's centre and the rim, as a share of a cell."""
 _GRAZING = 1e-3
 """Smallest cosine between a face's direction and the rim's normal: 1/n would overflow for a face along the rim."""
 _THICK = 1e4
-"""Decay lengths, in millimetres, at which joints are plain areas: what the discs' true areas are compared with."""
+"""Decay length [mm] at which connections are proportional to area: for comparison with the discs' true areas."""
 
 
 class Disc(NamedTuple):
-    """A round contact on the core; its place in the grid's coordinates."""
+    """A round electrode or excitation on the core, with its place in the grid's coordinates."""
 
     x_mm: float
     s_mm: float
     radius_mm: float
-    """Radius in the metric of the film."""
+    """Radius in true lengths on the film."""
     stretch: tuple[float, float] = (1.0, 1.0)
-    """Local stretch of the film relative to the grid, along x and s."""
+    """Ratios of lengths on the film to lengths on the grid, along x and s, at the disc."""
 
 
 class RimmedDiscs:
@@ -87,7 +87,7 @@ class RimmedDiscs:
     def _rims(
         self, offset: FloatArray, place: npt.NDArray[np.intp], step: FloatArray, shape: npt.NDArray[np.intp]
     ) -> None:
-        """Find the faces that cross a rim, and what plane each cell beside one sees; all are (4, cells)."""
+        """Find the faces that cross a rim, and the straight rim assumed at each cell beside one; all are (4, cells)."""
         distance = np.maximum(np.hypot(*offset), 1e-9)
         outward = _SIGN * (offset / distance)[_AXIS]
         reach, width = step[_AXIS], step[1 - _AXIS]
@@ -113,11 +113,11 @@ class RimmedDiscs:
         self._outward, self._width, self._reach = outward[:, beside], width[:, beside], reach[:, beside]
 
     def _decay(self, film: FloatArray, cells: npt.NDArray[np.intp] | slice = slice(None)) -> FloatArray:
-        """Return lambda, for a film given at the discs' cells."""
+        """Return the decay length ``lambda`` [mm] for film thicknesses at the discs' cells."""
         return np.asarray(film / np.sqrt(3.0 + (4.0 / np.pi) * film / self._radius[cells]))
 
     def _beside_rim(self, decay: FloatArray) -> FloatArray:
-        """Return joints over film thickness of the cells beside a rim: what balances the plane solution there."""
+        """Return the conductances over film thickness of cells beside a rim that balance the plane solution there."""
         entering = self._outward * (self._width / decay) * np.exp(np.minimum(self._depth / decay, _MOST_DECAYS))
         passing = (self._width / self._reach) * np.expm1(np.minimum(self._outward * self._reach / decay, _MOST_DECAYS))
         return np.asarray(np.maximum((np.where(self._crossing, entering, passing) * self._exists).sum(axis=0), 0.0))
@@ -136,7 +136,7 @@ class RimmedDiscs:
         return joint[: self.owner.size], drive
 
     def narrow(self, film_mm: FloatArray, along_x: FloatArray, along_s: FloatArray) -> None:
-        """Shorten the way of the faces that cross a rim; changes the (nx-1, ns) and (nx, ns-1) conductances."""
+        """Raise, in place, the (nx-1, ns) and (nx, ns-1) conductances of faces across a rim: their path is shorter."""
         flat = film_mm.reshape(-1)
         for (face, inner, step, slope, way), conductance in zip(self._crossed, (along_x, along_s), strict=True):
             decay = self._decay(flat[self._cell[inner]], inner)

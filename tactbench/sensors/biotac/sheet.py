@@ -1,4 +1,4 @@
-"""Conduction in a thin film between disc electrodes.
+"""Computation of the electric resistances between disc electrodes under a thin conducting film.
 
 The potential, averaged over the film's depth h, obeys ``div(sigma h grad phi) = 0`` with insulated edges. Finite
 volumes: a face conducts with the logarithmic mean of its two cells, ``(h2 - h1) / ln(h2 / h1)``, which is exact where
@@ -12,9 +12,9 @@ the disc on a half-space, 1/(4 sigma a). Their sum agrees with the method of ima
 ``R = 1/(4 sigma a) + (ln(r/(4h)) + gamma) / (2 pi sigma h)``, within 2 % of 1/(4 sigma a) for h > 1.2 a.
 
 Electrodes are read one at a time: an electrode's resistance is the one between it and all excitations while the others
-carry no current, ``Z_ee``, the diagonal of the resistance matrix. Cells eliminated by one factorisation,
-``Z = (D - Bᵀ C⁻¹ B)⁻¹`` with C the cells' own matrix, B the joints and D their sums by electrode: all electrodes for
-the price of one. Everything is divided by sigma.
+carry no current, ``Z_ee``, the diagonal of the resistance matrix. One factorisation eliminates the cells,
+``Z = (D - Bᵀ C⁻¹ B)⁻¹`` with C the cells' own matrix, B the joints and D their sums by electrode, and gives all
+electrodes at once. All conductances are divided by sigma.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Faces(NamedTuple):
     """Conductances of the faces between cells at unit thickness: width over distance of the cells' centres."""
 
     along_x: FloatArray
-    """(nx-1, ns)"""
+    """(nx-1, ns) conductances between neighbours along x."""
     along_s: FloatArray
-    """(nx, ns-1)"""
+    """(nx, ns-1) conductances between neighbours along the arc s."""
 
 
 def faces_between(corners_mm: FloatArray) -> Faces:
@@ -53,8 +53,8 @@ class FilmSheet:
     def resistances(self, film_mm: FloatArray) -> FloatArray:
         """Return the (n_electrodes, n_electrodes) resistances times sigma under a (nx, ns) film, in 1/mm.
 
-        Entry (i, j): the potential of electrode i, the excitations grounded, while a unit of current enters at j and
-        leaves by the excitations.
+        Entry (i, j) is the potential of electrode i while a unit of current enters at electrode j and leaves by the
+        grounded excitations.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class FilmSheet:
 
 
 def _logarithmic_mean(one: FloatArray, other: FloatArray, log_ratio: FloatArray) -> FloatArray:
-    """Return ``(b - a) / ln(b/a)``; by its series where the difference of logarithms would cancel."""
+    """Return ``(b - a) / ln(b/a)`` of two arrays; by a series where the difference of logarithms would cancel."""
     near = np.abs(log_ratio) < 1e-3
     log_ratio[near] = 1.0
     mean = (other - one) / log_ratio

@@ -1,4 +1,4 @@
-"""The BioTac as a declaration: streams, skin, what its transduction needs, nuisances."""
+"""Specification of the BioTac: streams, skin, parameters of its transduction, nuisances."""
 
 from __future__ import annotations
 

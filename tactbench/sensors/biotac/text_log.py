@@ -1,4 +1,4 @@
-"""Reader of the text log of the maker's tools for the Cheetah adapter.
+"""Reader of BioTac text logs, as written by the maker's tools for the Cheetah adapter.
 
 A line is ``time batch frame channel value parity [value parity ...]``, separated by blanks, one pair for each sensor;
 time in seconds with six decimals, 0.000000 throughout where the host's clock was not read; channel the number of the
@@ -26,9 +26,9 @@ from tactbench.sensors.biotac.frames import FrameRows, quality_of, streams_of
 from tactbench.sensors.biotac.options import LogOptions
 
 _LONGEST_S = 9e9
-"""Limit on times, which in nanoseconds fit in 64 bits."""
+"""Largest time [s] that is read, such that nanoseconds fit in 64 bits."""
 _MOST_FRAMES = 2**26
-"""Limit on frame numbers: more than a week of frames."""
+"""Largest frame number that is read: more than a week of frames."""
 
 
 class _Line(NamedTuple):
@@ -39,10 +39,10 @@ class _Line(NamedTuple):
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
-    """Read a log as ``SensorDescriptor.log_reader`` promises.
+    """Read a BioTac's text log, as ``SensorDescriptor.log_reader`` requires.
 
     Words that the log lacks are marked missing; sequence numbers count from the log's own frame numbers. The order of a
-    frame is that of most frames of the log. Error replies cannot be distinguished from bad parity, since the log has
+    frame is that of most frames of the log. Error replies cannot be distinguished from wrong parity: the log has
     only the resulting number. Times are those of the log; without any they are row numbers over the rate, if the option
     `rate_hz` or the header states one. The rate of a log with times is measured from its first and last row. Options
     are those of :class:`~tactbench.sensors.biotac.options.LogOptions`.
@@ -50,7 +50,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     Raises
     ------
     UsageError
-        For options that are not known.
+        If an option is unknown.
     DataError
         If the file cannot be read, or has no sample of the sensor.
     """
@@ -58,15 +58,15 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
-        raise DataError(f"{path} cannot be read: {error.strerror}.", hint="Give a text log.") from error
+        raise DataError(f"{path} cannot be read: {error.strerror}.", hint="Give the path of a text log.") from error
     begin = next((n for n, line in enumerate(lines) if "begin file" in line.lower()), -1)
     header = "\n".join(lines[: max(begin, 0)])
     counts: Counter[str] = Counter()
     frames = _frames(lines[begin + 1 :], settings.sensor, counts)
     if not frames:
         raise DataError(
-            f"No line of the log holds a sample of sensor {settings.sensor}; {counts.total()} hold something else.",
-            hint="A line is: time batch frame channel value parity, the last two for each sensor.",
+            f"No line of the log has a sample of sensor {settings.sensor}; {counts.total()} lines have other contents.",
+            hint="Give a log with lines: time batch frame channel value parity, the last two for each sensor.",
         )
     order = Counter(tuple(line.channel for line in frame) for frame in frames).most_common(1)[0][0]
     timed = any(line.time_s != 0.0 for frame in frames for line in frame)
@@ -110,7 +110,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
 
 
 def _frames(lines: Sequence[str], sensor: int, counts: Counter[str]) -> list[list[_Line]]:
-    """Return a sensor's lines frame by frame; lines that are no sample are counted by reason."""
+    """Return a sensor's lines grouped by frame; other lines are counted in `counts` by reason."""
     frames: list[list[_Line]] = []
     for words in filter(None, map(str.split, lines)):
         line = _read(words, sensor)
@@ -126,7 +126,7 @@ def _frames(lines: Sequence[str], sensor: int, counts: Counter[str]) -> list[lis
 
 
 def _read(words: list[str], sensor: int) -> _Line | None:
-    """Return the parsed line, or None if it is not a sample."""
+    """Return the sample in a line's words for one sensor, or None if the line is not a sample."""
     pair = words[4 + 2 * sensor : 6 + 2 * sensor]
     if len(words) % 2 or len(pair) < 2:
         return None
@@ -148,7 +148,7 @@ def _read(words: list[str], sensor: int) -> _Line | None:
 def _rate(
     settings: LogOptions, header: str, samples: Sequence[tuple[int, float]]
 ) -> tuple[float | None, Source | None]:
-    """Return commands a second and their source: the option, the header, or the log's positions and times."""
+    """Return sampling commands per second and their source: the option, the header, or the log's times."""
     if settings.rate_hz is not None:
         return settings.rate_hz, Source(tag="sourced", reference="option rate_hz of the import")
     stated = re.search(r"SampRate:\s*([1-9]\d*)", header)

@@ -1,6 +1,6 @@
 """Conversion of skin states to the BioTac's counts: film, conduction, divider, and the fluid's pressure.
 
-It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin: effects of the twin give them.
+It gives the 19 electrodes and PDC. TDC, TAC and PAC are not computed from the skin but by effects of the twin.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
 
 _STEP_MM = 0.1
-"""Step over which the film's stretch under a disc is computed: an eighth of the disc or less."""
+"""Step [mm] for differences that give the film's stretch under a disc: an eighth of the disc's size or less."""
 
 
 class Electrodes:
@@ -39,7 +39,7 @@ class Electrodes:
         self.sheet = FilmSheet(faces_between(corners), discs_on(sensor, fine))
 
     def resistances(self, state: SkinState) -> FloatArray:
-        """Return (n_electrodes,) resistances times sigma, 1/mm, of electrodes read one at a time.
+        """Return the (n_electrodes,) resistances times conductivity, 1/mm, of electrodes read one at a time.
 
         The film at rest is evaluated on the conduction grid exactly, the deflection interpolated.
         """
@@ -47,7 +47,7 @@ class Electrodes:
         return np.diag(self.sheet.resistances(np.maximum(self.film - deflection, self.residual_film)))
 
     def shares(self, state: SkinState) -> FloatArray:
-        """Return (n_electrodes,) the share of the drive across the reference resistor.
+        """Return the (n_electrodes,) shares, 0 to 1, of the drive voltage across the reference resistor.
 
         ``R_ref / (R_ref + Z_ee)``, the divider of the maker's formula ``Z = (4095 / E - 1) 10 kOhm``. That the others
         carry no current while one is sampled is derived: the commands address one channel, and no public text
@@ -61,7 +61,7 @@ def build(
 ) -> Transducer:
     """Return the BioTac's transducer: readings in counts, before noise, rounding and clipping.
 
-    `channel_names` are of E1 to E19 and PDC; `refinement` is that of :func:`refined`.
+    `channel_names` may contain E1 to E19 and PDC; `refinement` is that of :func:`refined`.
 
     Raises
     ------
@@ -71,15 +71,15 @@ def build(
     for name in channel_names:
         if name not in NAMES and name != "PDC":
             raise RigError(
-                f"{name} of {sensor.name} is not read from the skin.",
-                hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
+                f"{name} of {sensor.name} cannot be computed from the skin.",
+                hint=f"Choose from {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
     electrodes = Electrodes(sensor, grid, refinement)
     places = [(place, NAMES.index(name)) for place, name in enumerate(channel_names) if name in NAMES]
     channels = {channel.name: channel for channel in sensor.channels()}
     pdc, full_scale = channels["PDC"], channels[NAMES[0]].upper or 0.0
     if pdc.scale is None or pdc.rest is None:
-        raise RigError("PDC needs a scale and a rest level.", hint="Complete the sensor's channel.")
+        raise RigError("PDC has no scale or no rest level.", hint="State both in the channel's spec.")
     pa_per_count, pdc_rest = pdc.scale.to("Pa/count"), pdc.rest.value
 
     def read(state: SkinState) -> FloatArray:
@@ -94,7 +94,7 @@ def build(
 
 
 def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
-    """Return electrodes and excitation on the cells of `grid`, round in the metric of the film's middle.
+    """Return electrodes and excitation on the cells of `grid`, as discs that are round on the film's middle surface.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
     electrodes = []
     for channel in sensor.channels("taxel"):
         if channel.position_m is None:
-            raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="Give ChannelSpec.position_m.")
+            raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="State ChannelSpec.position_m.")
         x, y, z = (1e3 * component for component in channel.position_m)
         place = sheet_x(x, float(np.hypot(y, z)), outer, dome)
         electrodes.append(disc_at(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
@@ -130,7 +130,7 @@ def disc_at(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float)
 
 
 def finger_of(sensor: SensorSpec) -> tuple[FluidBackedShell, float, float]:
-    """Return the shell, its outer radius and where its dome begins [mm]; raises RigError for another skin."""
+    """Return the shell, its outer radius [mm] and its dome's start [mm]; raises RigError for another kind of skin."""
     skin = sensor.skin
     if not isinstance(skin, FluidBackedShell) or skin.sheet.outer_radius is None or skin.sheet.dome is None:
         raise RigError(

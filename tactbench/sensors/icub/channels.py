@@ -7,13 +7,13 @@ import math
 from tactbench.plugin import ChannelSpec, Source, StreamSpec, measured
 
 OUTER_RADIUS_MM = 6.5
-"""Half of the 13 mm that Schmitz et al. 2010 state for the width."""
+"""Radius of the fingertip's outer surface: half of the width of 13 mm that Schmitz et al. 2010 state."""
 
 PLACES_MM: tuple[tuple[float, float], ...] = (
     (6.0, 0.0), (4.0, -2.4), (4.0, 2.4), (1.5, 0.0), (1.0, -4.2), (1.0, 4.2),
     (-1.6, -1.9), (-1.6, 1.9), (-2.6, -5.2), (-2.6, 5.2), (-5.0, -2.2), (-5.0, 2.2),
 )  # fmt: skip
-"""(axial, arc) of T1 to T12 on the outer surface, x towards the tip: assumed."""
+"""Places (axial towards the tip, along the arc) of the taxels T1 to T12 on the outer surface; assumed."""
 
 _PLACE_SOURCE = Source(
     tag="assumed",
@@ -58,4 +58,4 @@ STREAMS: tuple[StreamSpec, ...] = (
         channels=tuple(_taxel(number, x, s) for number, (x, s) in enumerate(PLACES_MM, start=1)),
     ),
 )
-"""One clock."""
+"""Streams of the fingertip: one, since all taxels are read on one clock."""

@@ -1,9 +1,9 @@
-"""The iCub skin's CAN frames: values to bytes and back, for the boards (MTB, MTB4) that carry its fingertips.
+"""Conversion of the iCub skin's CAN frames to values and back, for boards (MTB, MTB4) that carry its fingertips.
 
 A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
 [sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
 ``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
-(IM: ``CanBusSkin.cpp``) unless stated. Nothing here has met a real board.
+(IM: ``CanBusSkin.cpp``) unless stated. The module has never been tested with a real board.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ BIT_RATE = 1_000_000
 """Bits a second on the bus [sourced: IM, rate index 0, "1 MB/s" in its comment]."""
 TAXELS = 12
 HEAD, TAIL = 0x40, 0xC0
-"""First byte of the frame with taxels 0 to 6, and of that with taxels 7 to 11 and the error word."""
+"""First byte of a triangle's head (frame with taxels 0 to 6) and of its tail (taxels 7 to 11 and the error word)."""
 IN_HEAD = 7
-"""Taxels in the head."""
+"""Number of taxels in the first of a triangle's two frames, the head."""
 POLLING, OLD_SKIN, SKIN = 2, 3, 4
-"""Classes, bits 8 to 10 of an identifier. Class 3 also belongs to other analog sensors."""
+"""Message classes (bits 8 to 10) of a CAN identifier. Class 3 is used by other analog sensors, too."""
 BROADCAST = 0xF
-"""Destination that every board takes as its own."""
+"""Destination number of a command that addresses every board on the bus."""
 NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
-"""Low bits of the error word: some taxel gave no answer; the chip gave none; no source gives these a meaning."""
+"""Low bits of the error word: some taxel did not acknowledge; the chip did not; bits without documented meaning."""
 
 
 @dataclass(frozen=True)
 class BoardSetup:
-    """Skin type, period and reading at rest; the board then has no triangle enabled [sourced: IF theSkin].
+    """Command that sets skin type, period and reading at rest, and disables all triangles [sourced: IF theSkin].
 
     Types: 0 compensated for temperature, 1 palm and fingertip, 2 not compensated, 3 hand of the ergoCub, 7 raw test,
     8 compensated, version 2. The defaults are IM's (the firmware's own: 50 ms, 245) with type 1.
@@ -49,10 +49,10 @@ class BoardSetup:
 
 @dataclass(frozen=True)
 class TriangleSetup:
-    """Shift, converter offset and enabling of triangles `first` to `last`.
+    """Command that sets shift and converter offset of triangles `first` to `last`, and enables or disables them.
 
-    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. A range
-    that does not ascend within 0 to 15 is passed over [sourced: IF theSkin].
+    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. The board
+    ignores a range that does not ascend within 0 to 15 [sourced: IF theSkin].
     """
 
     first: int = 0
@@ -64,14 +64,14 @@ class TriangleSetup:
 
 @dataclass(frozen=True)
 class Transmit:
-    """Start or stop sending."""
+    """Command to the board to start or stop sending readings."""
 
     on: bool
 
 
 @dataclass(frozen=True)
 class OldSetup:
-    """Old set-up. MTB4 firmware takes its own defaults instead of the numbers, a new baseline, and *starts*, 40 ms."""
+    """Old set-up command: MTB4 firmware ignores its numbers, takes a new baseline and *starts*, every 40 ms."""
 
     timer: int = 1
     cdc_offset: int = 0x2000
@@ -80,7 +80,7 @@ class OldSetup:
 
 @dataclass(frozen=True)
 class OldSetup2:
-    """Second half of the old set-up; unknown to MTB4 firmware."""
+    """Second command of the old set-up, which MTB4 firmware does not have."""
 
     shift: int = 2
     shift_3_1: int = 0x22
@@ -91,7 +91,7 @@ class OldSetup2:
 
 @dataclass(frozen=True)
 class VersionRequest:
-    """Ask for the firmware's version, naming the protocol that is needed: the only command with an answer."""
+    """Request for the firmware's version, with the needed protocol version; the only command with an answer."""
 
     major: int = 2
     minor: int = 0
@@ -114,20 +114,20 @@ class Version:
     """Answer to :class:`VersionRequest` [sourced: IF embot_prot_can.cpp, Message_GET_VERSION]."""
 
     board_type: int
-    """11 is the MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4]."""
+    """Number of the board's type, 11 for the MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4]."""
     firmware: tuple[int, int, int]
     protocol: tuple[int, int]
     fits: bool
-    """The board speaks the requested protocol."""
+    """True if the board supports the requested protocol version."""
 
 
 def polling_id(board: int, source: int = 0) -> int:
-    """Return the identifier of a command to `board` (15: to all) from `source`."""
+    """Return the CAN identifier of a command to `board` (15: to all boards) from the node `source`."""
     return POLLING << 8 | source << 4 | board
 
 
 def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
-    """Return the identifier of a triangle's two frames; `old`: of class 3, as early firmware sends."""
+    """Return the CAN identifier of a triangle's two frames; with `old`, that of class 3, as early firmware sends."""
     return (OLD_SKIN if old else SKIN) << 8 | board << 4 | triangle
 
 
@@ -141,7 +141,7 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
     """
     code, layout, before, after = _LAYOUTS[type(command)]
     if isinstance(command, TriangleSetup) and not 0 <= command.first <= command.last <= 15:
-        raise UsageError(f"Triangles {command.first} to {command.last} do not ascend.", hint="Give 0 to 15.")
+        raise UsageError(f"Triangles {command.first} to {command.last} do not ascend.", hint="Give two of 0 to 15.")
     numbers = (not command.on,) if isinstance(command, Transmit) else astuple(command)
     try:
         data = bytes([code]) + before + struct.pack(layout, *numbers) + after
@@ -153,7 +153,7 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
 
 
 def read_command(frame: CanFrame) -> tuple[int, Command] | None:
-    """Return (destination board, command), or None if `frame` is none of these commands or too short for it."""
+    """Return (destination board, command), or None if `frame` is not a known command or is too short."""
     if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
         return None
     board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
@@ -175,7 +175,7 @@ def read_command(frame: CanFrame) -> tuple[int, Command] | None:
 
 
 def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
-    """Return the answer of `board` to the :class:`VersionRequest` of `to`."""
+    """Return the frame by which `board` answers the :class:`VersionRequest` of the node `to`."""
     numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, version.fits)
     return CanFrame(polling_id(to, board), bytes(numbers))
 
@@ -193,9 +193,9 @@ def read_version(frame: CanFrame) -> tuple[int, Version] | None:
 def skin_frames(
     board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
 ) -> tuple[CanFrame, CanFrame]:
-    """Return head and tail of (12,) readings, 0 to 255.
+    """Return the two frames, head and tail, that carry a triangle's (12,) readings, 0 to 255, and error word.
 
-    Bit 4 + i of the error word is taxel i out of range, beside :data:`NO_ACK` and :data:`NOT_CONNECTED`.
+    Bit 4 + i of the error word means that taxel i is out of range; lower bits: :data:`NO_ACK`, :data:`NOT_CONNECTED`.
     """
     values, identifier = bytes(taxels), skin_id(board, triangle, old=old)
     return (
@@ -205,12 +205,12 @@ def skin_frames(
 
 
 def out_of_range(word: int) -> tuple[int, ...]:
-    """Return the taxels, 0 to 11, that the error word calls out of range."""
+    """Return the numbers, 0 to 11, of the taxels that are out of range according to the error word."""
     return tuple(taxel for taxel in range(TAXELS) if word >> 4 + taxel & 1)
 
 
 def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
-    """Return the byte a board sends, and whether it calls the taxel out of range [sourced: IF theSkin, fill].
+    """Return the byte a board sends, and True if the board flags it as out of range [sourced: IF theSkin, fill].
 
     `change` is the converter's result minus baseline minus drift: pressure makes it positive and the byte smaller.
     `no_load` is the byte at rest, `shift` the bits of the change that are dropped (arithmetically).
@@ -226,59 +226,59 @@ def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
 
 @dataclass(frozen=True)
 class Sample:
-    """12 taxels of one triangle; nothing in it is interpolated or carried over from another sample."""
+    """Readings of one triangle's 12 taxels at one time; none is interpolated or copied from another sample."""
 
     board: int
     triangle: int
     t_ns: int
-    """Host time of its first frame, nanoseconds."""
+    """Host time of the sample's first frame, nanoseconds."""
     taxels: bytes
     """(12,) counts, as the sensor's spec has them: 0 to 255, falling under pressure; 0 where missing."""
     quality: tuple[Quality, ...]
-    """(12,)"""
+    """(12,) quality flags of the taxels."""
 
 
 @dataclass
 class _Triangle:
     counts: Counter[str] = field(default_factory=Counter)
     head: CanFrame | None = None
-    """Waits for its tail."""
+    """Last frame with taxels 0 to 6, as long as the frame with taxels 7 to 11 has not come."""
     tail: CanFrame | None = None
-    """The last one."""
+    """Last frame with taxels 7 to 11 and the error word."""
     doubled: tuple[int, ...] = ()
-    """Taxels of frames that came twice since the last sample."""
+    """Numbers of the taxels in frames received twice since the last sample."""
     last_ns: int | None = None
 
 
 class SkinDecoder:
-    """From frames, as they come from a bus or a log, to samples.
+    """Decoder of CAN frames, in their order on a bus or in a log, into samples.
 
-    A head and the tail behind it make a sample: frames keep their order on the bus. Half a period apart or more, all
-    its taxels are SUSPECT; nine tenths, they are of two samples whose other halves were lost. Two heads or two tails in
-    a row are one frame doubled if they are equal and less than half a period apart; otherwise a half is missing. What
-    cannot be known from such frames: a whole sample lost, or doubled; which of two equal heads in a burst was doubled
-    and which lost its tail.
+    A head (taxels 0 to 6) and the next tail (taxels 7 to 11) are a sample. If they are half a period apart or more, all
+    taxels are SUSPECT; from nine tenths on, they belong to two samples whose other halves were lost. Two heads or two
+    tails in a row are one frame doubled if they are equal and less than half a period apart; otherwise a half is
+    missing. Not detectable: a whole sample lost or doubled; which of two equal heads in a burst was doubled and which
+    lost its tail.
 
     Quality of a sample: missing halves are MISSING, and a head without tail, hence without error word, is SUSPECT.
-    A taxel out of range or at 0 or 255 is SATURATED, one out of range also SUSPECT (the board's own test for broken
+    A taxel out of range or at 0 or 255 is SATURATED, a taxel out of range also SUSPECT (the board's own test for broken
     taxels). No acknowledgement and reserved bits make all taxels SUSPECT, not connected makes all MISSING. A doubled
-    frame makes its taxels SUSPECT in the sample it is found before. A board in the raw test (type 7) sends the low
-    bytes of its results, which nothing in the frames tells from readings.
+    frame makes its taxels SUSPECT in the sample that follows. A board in the raw test (type 7) sends the low bytes of
+    its results, which cannot be distinguished from readings.
 
     Parameters
     ----------
     period_s
         The boards' period, seconds.
     old_ids
-        Also take class 3, which other analog sensors on the bus share.
+        Decode frames of class 3, too, which other analog sensors on the bus may send.
 
     Attributes
     ----------
     counts
-        (board, triangle) -> what was wrong so far, by the names that a recording has. A long interval between samples
-        is one of more than 1.5 periods: both frames lost, or a late host; only a fit of the clocks can tell.
+        (board, triangle) -> numbers of faults so far, by name. An interval between samples is long above 1.5 periods:
+        both frames were lost or the host was late; only a fit of the clocks can show which.
     foreign
-        Frames that were no skin data.
+        Number of frames that were no skin data.
 
     Raises
     ------
@@ -296,11 +296,11 @@ class SkinDecoder:
 
     @property
     def counts(self) -> dict[tuple[int, int], Counter[str]]:
-        """(board, triangle) -> what was found so far."""
+        """(board, triangle) -> numbers of faults found so far, by name."""
         return {key: triangle.counts for key, triangle in self._triangles.items()}
 
     def feed(self, frame: CanFrame) -> list[Sample]:
-        """Return the samples, at most two, that `frame` completes or proves incomplete."""
+        """Return the samples, at most two, that end with `frame`: complete, or with a frame missing."""
         data = frame.data
         known = not frame.extended and 0 <= frame.id <= 0x7FF and frame.id >> 8 in self._classes
         if not known or not data or data[0] not in (HEAD, TAIL):
@@ -332,7 +332,7 @@ class SkinDecoder:
         return [self._sample(key, triangle, head, None), self._sample(key, triangle, None, frame)]
 
     def flush(self, before_ns: int | None = None) -> list[Sample]:
-        """Return samples of heads that still wait for their tails: those from before `before_ns`, or all."""
+        """Return incomplete samples, of heads without a tail so far: those from before `before_ns`, or all."""
         found = []
         for key, triangle in self._triangles.items():
             head = triangle.head

@@ -1,4 +1,4 @@
-"""An iCub fingertip on a CAN bus, read from its board."""
+"""Driver of an iCub fingertip, which is read from its board on a CAN bus."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ from tactbench.sensors.icub.codec import (
 from tactbench.sensors.icub.options import FingertipOptions
 
 SETTLE_S = 0.5
-"""From the set-up to the start: the board takes its baseline [sourced: icub-main CanBusSkin.cpp waits as long]."""
+"""Seconds between set-up and start, for the board to take its baseline [sourced: icub-main CanBusSkin.cpp]."""
 ANSWER_S = 0.5
-"""Until a version is missed [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
+"""Seconds to wait for a board's version [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
 MOST_FRAMES = 4096
-"""Taken by one call of `read`: a bus that never rests does not keep it for ever. 0.5 s of a full bus."""
+"""Largest number of frames in one call of `read`, so that it returns even on a full bus (after 0.5 s)."""
 
 
 class FingertipDriver(Driver):
-    """One fingertip: one triangle of one board.
+    """Driver of one fingertip, which is one triangle of one board.
 
-    Times are the frames': the board sends no number and no time. A head without a tail is a sample by itself once the
-    next head has come, or nothing comes for a period. Frames of other triangles, boards and hosts are counted and left
-    out; its own commands, which some buses give back, are left out.
+    Times are the frames' host times: the board sends no number and no time. A head (taxels 0 to 6) without tail (taxels
+    7 to 11) is a sample by itself after the next head, or after a period without frames. Frames of other triangles,
+    boards and hosts are counted and left out; the driver's own commands, which some buses return, are left out.
 
     Parameters
     ----------
     settings
-        Its link is a CanLink; its options are :class:`~tactbench.sensors.icub.options.FingertipOptions`.
+        The link is a CanLink; the options are those of :class:`~tactbench.sensors.icub.options.FingertipOptions`.
 
     Raises
     ------
     UsageError
-        If an option or the kind of link is not possible.
+        If an option is unknown or invalid, or the link is not a CanLink.
     LinkError
         If the link cannot be opened.
     """
@@ -72,23 +72,23 @@ class FingertipDriver(Driver):
         self._sent: set[tuple[int, bytes]] = set()
         self._sampling = False
         self._earlier: Counter[str] = Counter()
-        """Counts of what was read before the last start."""
+        """Numbers of faults by name, from before the last start."""
         self._others = 0
         self._decoder = self._fresh_decoder()
         self._link = open_for(settings, "icub", CanLink, "can://socketcan/can0")  # type: ignore[type-abstract]
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The taxels, at the rate that the board is set up for."""
+        """The stream of the taxels, at the rate for which the board is set up."""
         return (self._stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Faults as the decoder counts them; beside them frames of others and frames that are no skin data."""
+        """Numbers of faults by the decoder's names, of other senders' frames, and of frames without skin data."""
         return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
 
     def identify(self) -> Mapping[str, str]:
-        """Return board, triangle, and the firmware's version; a board that does not answer may be of old firmware.
+        """Return board, triangle, and the firmware's version; a board with old firmware may not answer.
 
         Raises
         ------
@@ -120,12 +120,12 @@ class FingertipDriver(Driver):
         }
 
     def start(self) -> None:
-        """Set the board up, let it take its baseline (nothing may touch the skin) and let it send.
+        """Set the board up, wait for its baseline (nothing may touch the skin) and start it.
 
         Raises
         ------
         LinkTimeout, LinkUnplugged
-            As of :meth:`identify`. None of these messages is acknowledged by the board.
+            For the reasons of :meth:`identify`. The board itself acknowledges no command.
         """
         self._earlier += self._counted()
         self._decoder = self._fresh_decoder()
@@ -172,7 +172,7 @@ class FingertipDriver(Driver):
         return SkinDecoder(self._options.period_s, old_ids=self._options.old_setup)
 
     def _counted(self) -> Counter[str]:
-        """Return what the decoder has counted; it is given frames of one triangle only."""
+        """Return the decoder's numbers of faults; the decoder receives frames of one triangle only."""
         found = Counter({"frames that are no skin data": self._decoder.foreign})
         for counts in self._decoder.counts.values():
             found.update(counts)
@@ -184,7 +184,7 @@ class FingertipDriver(Driver):
         self._link.send(frame)
 
     def _taken(self, frame: CanFrame) -> list[Sample]:
-        """Return the samples that `frame` completes."""
+        """Return the samples that end with `frame`; count frames that are not the fingertip's."""
         if not self._sampling:
             return []
         if frame.id in self._ids and not frame.extended:

@@ -1,10 +1,10 @@
-"""A board with an iCub fingertip, the only one on a CAN bus, as a model without input or output: frames in, frames out.
+"""Emulator of a board with an iCub fingertip, alone on a CAN bus: a function from received frames to sent frames.
 
-What the board does is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
-``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; where the model guesses, it is
-tagged [assumed]. Every set-up finds the fingertip unloaded, and what is sensed is the count on the bus: neither
-baselines, which a real board takes when it is set up and after five samples without acknowledgement, nor the
-compensation for temperature is modelled. Time is given, never read.
+The behaviour is that of an MTB4's firmware [sourced: robotology/icub-firmware, IF:
+``embot_app_application_theSkin.cpp``, ``AD7147.cpp``, ``embot_prot_can.cpp``]; guesses are tagged [assumed].
+Every set-up assumes an unloaded fingertip, and the given counts are sent unchanged: neither baselines, which a real
+board takes when it is set up and after five samples without acknowledgement, nor the compensation for temperature is
+modelled. The time is an argument; no clock is read.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ from tactbench.sensors.icub.codec import (
 from tactbench.sensors.icub.options import FingertipOptions
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
-"""An MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public application [sourced: IF, vAP and
-vCP of its main]."""
+"""Version of the emulated board: an MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public
+application [sourced: IF, vAP and vCP of its main]."""
 _REST_RESULT, _NO_CHIP = 0x8000, 0xFFFF
-"""The converter's result with nothing touching [assumed: the middle], and what a board reads where no chip answers
-[sourced: IF AD7147.cpp]. A taxel that is not acknowledged reads 0."""
+"""Results of the converter without contact [assumed: the middle of its range] and without a chip [sourced: IF
+AD7147.cpp]. A taxel that is not acknowledged reads 0."""
 
 _REST = {channel.name: channel.rest.to("count") for channel in STREAMS[0].channels if channel.rest is not None}
 _CHANNELS = tuple(_REST)
@@ -62,9 +62,9 @@ _CHANNELS = tuple(_REST)
 
 @dataclass(frozen=True)
 class BoardFault(Fault):
-    """Something wrong with a board; nothing is random.
+    """A fault of the emulated board, without randomness.
 
-    `every` counts frames, of those that are dropped, doubled or late.
+    For dropped, doubled or late frames, `every` n selects every n-th frame.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class BoardFault(Fault):
     """Half of the sample whose frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
-    """Bits of the error word."""
+    """Bits that the fault sets in the sample's error word."""
     delay_s: float = 0.01
 
     def __post_init__(self) -> None:
@@ -96,12 +96,12 @@ class BoardFault(Fault):
         if not good or not self.channels <= set(_CHANNELS):
             raise UsageError(
                 f"The fault {self.name!r} has a value outside its range.",
-                hint="half is head or tail, channels are T1 to T12, word 0 to 0xFFFF, delay_s is not negative.",
+                hint="Give half as head or tail, channels from T1 to T12, word from 0 to 0xFFFF, delay_s from 0 up.",
             )
 
 
 def frame_s(frame: CanFrame) -> float:
-    """Return how long a frame with an 11-bit identifier holds the bus, seconds, with all possible stuff bits.
+    """Return the seconds that a frame with an 11-bit identifier occupies the bus, with all possible stuff bits.
 
     [derived: CAN 2.0A, 44 bits and 8 a byte, of which 34 and 8 a byte are stuffed after each fourth, and 3 between
     frames: 135 bits for 8 bytes]
@@ -111,10 +111,10 @@ def frame_s(frame: CanFrame) -> float:
 
 
 class Bus(DeviceEmulator):
-    """A bus with one board, which sends one frame at a time; commands take no time on it [assumed: they are rare].
+    """Emulated CAN bus with one board, which sends one frame at a time; commands take no time [assumed: they are rare].
 
-    `senses` maps a second to counts of taxels, rounded and clipped to 0-255; those left out are at rest. The board's
-    triangles beside that of the fingertip have no chip. `faults` may be changed at any time.
+    `senses` maps a time [s] to counts of taxels, rounded and clipped to 0-255; taxels left out are at rest. Other
+    triangles of the board than the fingertip's have no chip. `faults` may be changed at any time.
     """
 
     def __init__(self, senses: Senses, *, board: int = 14, triangle: int = 0, faults: Iterable[BoardFault] = ()):
@@ -129,25 +129,25 @@ class Bus(DeviceEmulator):
         self._forget()
 
     def _forget(self) -> None:
-        """Take the firmware's defaults."""
+        """Reset the board's settings to the firmware's defaults."""
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
         self._shift = 2
         self._enabled = set(range(16))
         self._reads_s = math.inf
 
     def next_s(self) -> float:
-        """Return when `poll` has something to do next, seconds; infinite: not before a command."""
+        """Return the time [s] at which `poll` must be called next; infinity: not before a command."""
         return min(self._reads_s, self._first_end_s())
 
     def _first_end_s(self) -> float:
-        """Return when the first of the frames that leave has left."""
+        """Return the time [s] at which the next frame ends on the bus; infinity if none is ready."""
         if not self._leaving:
             return math.inf
         ready_s, _, frame = self._leaving[0]
         return max(self._free_s, ready_s) + frame_s(frame)
 
     def poll(self, now_s: float) -> list[tuple[float, CanFrame]]:
-        """Return the frames that ended up to `now_s`, in order, each with the second of its end and stamped with it."""
+        """Return (end [s], frame) of the frames that ended on the bus up to `now_s`, in order."""
         out: list[tuple[float, CanFrame]] = []
         while True:
             ready_s = self._leaving[0][0] if self._leaving else math.inf
@@ -161,7 +161,7 @@ class Bus(DeviceEmulator):
                 return out
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[tuple[float, CanFrame]]:
-        """Return what `poll(now_s)` does, after which the board carries out the command to it, if `piece` is one."""
+        """Return the frames of `poll(now_s)`; then carry out `piece` if it is a command to this board."""
         out = self.poll(now_s)
         assert isinstance(piece, CanFrame)
         found = read_command(piece)
@@ -196,14 +196,14 @@ class Bus(DeviceEmulator):
         self._reads_s = now_s + period_s if period_s else math.inf
 
     def _unplugged(self, now_s: float) -> bool:
-        """Return whether it is without power, after which nothing of its set-up is left."""
+        """Return True while the board is without power, by which it loses its set-up."""
         if not any(fault.name == "unplugged" and fault.active(now_s) for fault in self.faults):
             return False
         self._forget()
         return True
 
     def _read(self) -> None:
-        """Read the chips when that is due, and send head and tail of every enabled triangle."""
+        """Read the chips at a sampling time, and send the two frames of every enabled triangle."""
         now_s = self._reads_s
         if self._unplugged(now_s):
             return
@@ -217,7 +217,7 @@ class Bus(DeviceEmulator):
         self._send(frames, now_s)
 
     def _fingertip(self, now_s: float) -> tuple[list[int], int]:
-        """Return taxels and error word, from the converter's results less that at rest."""
+        """Return the fingertip's taxel bytes and error word, from the converter's results less those at rest."""
         no_load, shift = self._setup.no_load, self._shift
         sensed = {**_REST, **self._senses(now_s)}
         changes = [(no_load - min(max(round(sensed[name]), 0), 255)) << shift for name in _CHANNELS]
@@ -245,7 +245,7 @@ class Bus(DeviceEmulator):
         return taxels, word
 
     def _send(self, frames: Iterable[CanFrame], now_s: float) -> None:
-        """Make frames ready for the bus, after faults of sending."""
+        """Queue frames for the bus; faults of sending may drop, double or delay them."""
         for frame in frames:
             half = {HEAD: "head", TAIL: "tail"}.get(frame.data[0])
             copies, ready_s = 1, now_s
@@ -263,15 +263,15 @@ class Bus(DeviceEmulator):
 
 
 def build_emulator(settings: EmulatorSettings) -> Bus:
-    """Return one board with the fingertip of the options, a device on a CAN bus; it draws nothing.
+    """Return the emulator of one board with the fingertip of the options; it uses no random numbers.
 
-    The byte on the bus is the count that was sensed, rounded to a whole one and kept within 0 to 255. Taxels that
-    `senses` leaves out read the spec's rest.
+    The byte on the bus is the given count, rounded to an integer and limited to 0 to 255. Taxels that `senses` leaves
+    out have the spec's rest level.
 
     Raises
     ------
     UsageError
-        If an option or a fault is not known.
+        If an option or a fault is unknown.
     """
     options = read_options(FingertipOptions, settings.options, "icub")
     faults = [BoardFault.parse(text) for text in settings.faults]

@@ -1,4 +1,4 @@
-"""CAN logs of a bus with a fingertip, as samples."""
+"""Reader of CAN logs from a bus with an iCub fingertip."""
 
 from __future__ import annotations
 
@@ -29,20 +29,19 @@ from tactbench.sensors.icub.options import LogOptions
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     """Read one fingertip's samples from a log in a format of python-can: candump's, Vector's ASC and BLF, ...
 
-    Times count from the log's first message. Samples are those that the driver makes of the same frames; one whose
-    time is not after that of the sample before it is kept out and counted. Several buses in one log are not
-    distinguished.
+    Times count from the log's first message. Samples equal those of the driver from the same frames; a sample that is
+    not later than the previous one is left out and counted. Several buses in one log are not distinguished.
 
     Options are those of :class:`~tactbench.sensors.icub.options.LogOptions`.
 
     Raises
     ------
     UsageError
-        If an option is not known, or several fingertips fit.
+        If an option is unknown, or the options fit several fingertips.
     LinkError
-        If the file is no such log, or damaged.
+        If the file is not a CAN log, or is damaged.
     DataError
-        If no frames of such a fingertip are in it.
+        If the log has no frames of the fingertip.
     """
     settings = read_options(LogOptions, options, "a log of icub")
     classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
@@ -90,7 +89,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
 
 
 def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
-    """Return the one (board, triangle) of `there` that fits `wanted`."""
+    """Return the only (board, triangle) in `there` that fits the options `settings`."""
     fitting = [
         (board, triangle)
         for board, triangle in there
@@ -99,30 +98,28 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
     listed = "; ".join(f"board {board}, triangle {triangle}" for board, triangle in there)
     if not fitting:
         raise DataError(
-            f"{path} has no frames of that fingertip among its {frames} frames.",
+            f"{path} has no frames of the chosen fingertip among its {frames} frames.",
             hint=f"There are: {listed}."
             if there
-            else "Frames of early firmware (class 3) are taken with the option old_ids=true.",
+            else "Give the option old_ids=true for frames of early firmware (class 3).",
         )
     if len(fitting) > 1:
         raise UsageError(
-            f"{path} has frames of {len(fitting)} fingertips.",
-            hint=f"Choose one by the options board and triangle. There are: {listed}.",
+            f"{path} has frames of {len(fitting)} fingertips; one is expected.",
+            hint=f"Choose one by the options board and triangle. The log has: {listed}.",
         )
     return fitting[0]
 
 
 def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
-    """Return the period in seconds, and where it is from."""
+    """Return the period between samples in seconds, and its source (option or log)."""
     if settings.period_ms is not None:
         text = f"{settings.period_ms} ms between samples by the option period_ms"
         return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
     steps = np.diff([frame.t_ns for frame in frames if frame.data[0] == HEAD])
     steps = steps[steps > 0]
     if not len(steps):
-        raise UsageError(
-            f"{path} has too few samples to tell their period.", hint="State it with the option period_ms."
-        )
+        raise UsageError(f"{path} has too few samples to compute their period.", hint="State the option period_ms.")
     period_s = 1e-9 * float(np.median(steps))
     text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
     return period_s, Source(tag="measured", reference=text)

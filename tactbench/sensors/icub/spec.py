@@ -1,4 +1,4 @@
-"""The iCub fingertip as a declaration: streams, skin, what its transduction needs, nuisances."""
+"""Specification of the iCub fingertip: streams, skin, parameters of its transduction, nuisances."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ RANGES = ranges(
     ("taxel_creep_1_fraction", 0.04, 0.29, "1", "measured", "tacman-fp7/tactile-control: 16 % [4, 29]"),
     ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "1.8: on taxel T4; the paper does not say where its caps touch"),
 )
-"""Plausible ranges; factors refer to the values above."""
+"""Plausible ranges of the fingertip's nuisances; factors refer to the nuisances' default values."""
 
 # Force range, height, mass, supply power and availability: no source read so far states them.
 DATA_SHEET = DataSheet(

@@ -1,4 +1,4 @@
-"""From skin states to the iCub's counts: plate capacitors whose foam gets thinner."""
+"""Conversion of skin states to the iCub's counts: plate capacitors whose foam gets thinner under pressure."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from tactbench.plugin import ChannelSpec, FloatArray, RigError, SensorSpec
 from tactbench.plugin.simulation import FoamPad, SkinGrid, SkinState, Transducer
 
 SUBSAMPLES = 4
-"""Points per cell and axis that average a taxel's weight."""
+"""Number of points, per cell and axis, over which a taxel's weight is averaged."""
 _MIDDLE = 0.5
-"""Share of a cell's width over which the weight is averaged. A mean over the whole cell is off by a 24th of the cell
-squared times the field's curvature, 0.34 % of the readings on the spec's grid; the weight at the cell's centre alone
-loses its edge, 0.16 % there but 4.7 % on twice the cell. Half the width has a quarter of the first and most of the
-second: 0.17 % and 2.5 %, and weights that are never negative."""
+"""Share of a cell's width over which a taxel's weight is averaged. A mean over the whole cell has an error of 1/24 of
+the cell squared times the field's curvature, 0.34 % of the readings on the spec's grid; the weight at the cell's centre
+alone misses the taxel's edge, 0.16 % there but 4.7 % with cells twice as wide. Half the width gives 0.17 % and 2.5 %,
+and weights that are never negative."""
 
 
 def taxel_weight(grid: SkinGrid, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
     """Return the (nx, ns) share of each cell in a taxel's reading, at least zero, sum 1.
 
-    `centre_mm` is axial place and arc length of the taxel; the flat top ``exp(-(r^2/a^2)^4)`` falls at `radius_mm`.
+    `centre_mm` is axial place and arc length of the taxel; the weight ``exp(-(r^2/a^2)^4)`` falls at a = `radius_mm`.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
     Raises
     ------
     RigError
-        For a channel that is no taxel with a place and a rest level; for a skin that is no foam pad.
+        If a channel is not a taxel with a place and a rest level, or the skin is not a foam pad.
     """
     skin = sensor.skin
     if not isinstance(skin, FoamPad) or skin.sheet.outer_radius is None:
@@ -78,14 +78,14 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
 
 
 def _place_mm(taxel: ChannelSpec, outer_radius_mm: float) -> tuple[float, float]:
-    """Axial place and arc length on the outer surface."""
+    """Return a taxel's axial place and arc length [mm] on the outer surface."""
     if taxel.position_m is None:
-        raise RigError(f"{taxel.name} has no position.", hint="Give ChannelSpec.position_m.")
+        raise RigError(f"{taxel.name} has no position.", hint="State ChannelSpec.position_m.")
     x, y, z = taxel.position_m
     return 1e3 * x, outer_radius_mm * float(np.arctan2(y, -z))
 
 
 def _rest(taxel: ChannelSpec) -> float:
     if taxel.rest is None:
-        raise RigError(f"{taxel.name} has no rest level.", hint="Give ChannelSpec.rest.")
+        raise RigError(f"{taxel.name} has no rest level.", hint="State ChannelSpec.rest.")
     return taxel.rest.to("count")

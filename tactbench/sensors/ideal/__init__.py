@@ -1,4 +1,4 @@
-"""An ideal taxel grid: no noise, and readings that can be computed by hand (see ``docs/sensors.md``).
+"""An ideal grid of taxels, without noise and with readings in closed form, for tests (see ``docs/sensors.md``).
 
 Taxel i reads ``S * integral of p(r) exp(-|r - r_i|^2 / (2 sigma^2)) dA``: linear in the contact pressure p, and in
 closed form for a point load, for a Gaussian pressure and for a uniform one.
@@ -87,5 +87,5 @@ SPEC = SensorSpec(
 
 @hookimpl
 def tactbench_sensors() -> list[SensorDescriptor]:
-    """Offer the sensor."""
+    """Return the descriptor of the ideal taxel grid."""
     return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.ideal.transduction:build")]

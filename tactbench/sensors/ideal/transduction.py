@@ -1,4 +1,4 @@
-"""From contact pressure to the ideal grid's readings: an integral done exactly."""
+"""Conversion of contact pressure to the ideal taxel grid's readings, by an exact integral."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactbench.plugin.simulation import SkinGrid, SkinState, Transducer
 
 
 def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -> FloatArray:
-    """Return (n,) integrals of ``exp(-(x - at)^2 / (2 sigma^2))`` over cells around `centres_mm`, millimetres."""
+    """Return the (n,) integrals [mm] of ``exp(-(x - at)^2 / (2 sigma^2))`` over cells around (n,) `centres_mm`."""
     half = float(centres_mm[1] - centres_mm[0]) / 2
     edges = np.append(centres_mm - half, centres_mm[-1] + half) - at_mm
     primitive = np.array([math.erf(edge / (math.sqrt(2.0) * sigma_mm)) for edge in edges])
@@ -25,7 +25,7 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
     Raises
     ------
     RigError
-        For a channel that is no taxel with a place.
+        If a channel is not a taxel with a place.
     """
     places = {channel.name: channel.position_m for channel in sensor.channels("taxel")}
     sigma = sensor.parameters["influence"].to("mm")

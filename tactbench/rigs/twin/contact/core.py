@@ -1,7 +1,7 @@
-"""The rigid core under a fluid-backed skin, which carries load where the film is closed.
+"""Model of the rigid core under a fluid-backed skin, which carries load where the fluid film is closed.
 
-Added only when a load closes the film. Below that load the solution without the core is the solution with it, so
-leaving it out changes nothing.
+The core is added only when a load closes the film. Below that load the solutions with and without the core are the
+same.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tactbench.rigs.twin.contact.media import LocalLaw, Medium
 
 
 class CoreReaction:
-    """A one-sided spring under the film, on top of another local law."""
+    """Another local law plus a one-sided spring, which pushes only where the film is closed."""
 
     def __init__(self, below: LocalLaw, stiffness: float, film_mm: FloatArray) -> None:
         self._below = below
@@ -24,7 +24,7 @@ class CoreReaction:
         self._film_mm = film_mm
 
     def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-        """Return restoring pressure and summed energy density; fill the tangent."""
+        """Return the (nx, ns) restoring pressure [MPa] and the summed energy density [N/mm]; fill `tangent`."""
         pressure, energy = self._below(deflection_mm, tangent)
         pressed = deflection_mm - self._film_mm
         np.maximum(pressed, 0.0, out=pressed)

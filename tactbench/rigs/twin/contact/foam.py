@@ -1,4 +1,4 @@
-"""A hardening foam under a thin cover: the iCub's fingertip."""
+"""Model of the skin of the iCub's fingertip: a hardening foam under a thin cover."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tactbench.rigs.twin.geometry import skin_grid
 CUT_OVER = 0.97
 """Share of the densification strain beyond which the law is continued by its tangent, to avoid a division by zero."""
 OUTSIDE_THE_PAD = 1e-2
-"""Stiffness of the margin around the pad, relative to the foam."""
+"""Stiffness of the sheet's margin outside the foam pad, relative to the stiffness of the foam."""
 
 
 CONTACT_UPDATES = 2
-"""Corrections for the penalty's penetration. With them, ten times the iCub's contact stiffness changes no taxel by more
-than 0.08 counts (18 contacts of 5 mm to flat, 0.1 to 5 N); without, by up to 1.6."""
+"""Number of corrections for the penetration that the contact penalty allows. With two, ten times the iCub's contact
+stiffness changes no taxel by more than 0.08 counts (18 contacts, 5 mm to flat, 0.1 to 5 N); without, by up to 1.6."""
 
 
 class Foam:
@@ -30,7 +30,7 @@ class Foam:
         self._weight = weight
 
     def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-        """Return restoring pressure and summed energy density; fill the tangent."""
+        """Return the (nx, ns) restoring pressure [MPa] and the summed energy density [N/mm]; fill `tangent`."""
         share = np.abs(deflection_mm)
         share /= self._limit
         beyond = None
@@ -55,9 +55,9 @@ class Foam:
 
 
 def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a pad from `low` to `high`: edges of those cells of the sheet whose centres lie inside.
+    """Return the ends of a pad from `low` to `high`: outer edges of the sheet's cells with their centres inside.
 
-    The reference figures of the solver hold for this pad; on whatever grid, so that a finer one converges to it.
+    The ends are the same on every grid, so that finer grids converge to the pad of the solver's reference figures.
     """
     half = float(own[1] - own[0]) / 2
     inside = own[(own >= low) & (own <= high)]
@@ -65,16 +65,16 @@ def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
 
 
 def _covered(centres: FloatArray, low: float, high: float) -> FloatArray:
-    """Return the share of each cell that lies between `low` and `high`."""
+    """Return the (n,) shares, 0 to 1, of cells with (n,) `centres` that lie between `low` and `high`."""
     step = float(centres[1] - centres[0])
     ends = np.minimum(centres + step / 2, high) - np.maximum(centres - step / 2, low)
     return np.asarray(np.clip(ends / step, 0.0, 1.0))
 
 
 def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
-    """Return the pad on `grid`.
+    """Return the medium of a foam pad on `grid`.
 
-    Pasternak shear and the cover in the modes, ``K = (G h / 3 + T) k² + D k⁴``; the foam's hardening cell by cell.
+    Its modes hold Pasternak shear and the cover, ``K = (G h / 3 + T) k² + D k⁴``; its local law is the hardening foam.
     """
     young, thickness = skin.young.to("MPa"), skin.thickness.to("mm")
     spectrum = Spectrum(grid)

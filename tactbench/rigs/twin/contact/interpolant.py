@@ -1,4 +1,4 @@
-"""Shape-preserving cubic interpolation over load nodes, with breaks between its parts."""
+"""Shape-preserving cubic interpolation over loads, with breaks where one smooth part ends and the next begins."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tactbench.plugin import FloatArray
 
 
 def slopes(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the (n, c) slopes at the nodes of (n,) ``x`` and (n, c) ``y``.
+    """Return the (n, c) slopes, at (n,) nodes ``x``, of the interpolant of (n, c) values ``y``.
 
-    Those of the cubic spline (not-a-knot ends), limited to three times the smaller neighbouring secant wherever both
+    Slopes of the cubic spline (not-a-knot ends), limited to three times the smaller neighbouring secant wherever both
     secants have one sign: monotone data give a monotone interpolant (Hyman 1983). On a BioTac's electrodes below
     touch-down the error at equal nodes is 2 to 13 times smaller than that of PCHIP, whose slopes are of second order.
     """
@@ -52,14 +52,14 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
 
 
 _ROUNDING_N = 0.05
-"""Offset under the power, without which its slope at the break would be infinite."""
+"""Offset [N] under the power of the load; without the offset the power's slope at the break would be infinite."""
 
 
 class Interpolant:
     """Piecewise cubic in (n,) ascending loads, n >= 2, of (n, c) values.
 
-    `breaks` are indices of nodes where one cubic ends and the next begins. Beyond the last of them the cubics run in
-    ``(load - load at that break) ** power``, rounded off; elsewhere in the load itself.
+    `breaks` are indices of nodes where one spline ends and the next begins. Beyond the last break the cubics' variable
+    is ``(load - load at that break) ** power``, rounded off; elsewhere it is the load itself.
     """
 
     def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
@@ -93,8 +93,8 @@ class Interpolant:
     def steepest(self, low: float, high: float) -> FloatArray:
         """Return (c,) upper bounds of the absolute slopes between two loads within the nodes' range.
 
-        Whole intervals are looked at. A cubic's slope is a parabola: its ends and its vertex. Where the cubics run in a
-        power of the load the factor between the two slopes is monotone, so that its larger end bounds it.
+        The bounds hold for whole intervals. A cubic's slope is a parabola, steepest at an end or at the vertex. Where
+        the variable is a power of the load, the factor between the two slopes is monotone: its larger end bounds it.
         """
         first, last = np.searchsorted(self.loads, [low, high], side="right") - 1
         at = np.arange(min(first, self.loads.size - 2), min(last, self.loads.size - 2) + 1)
@@ -107,7 +107,7 @@ class Interpolant:
         return out
 
     def _stretch(self, load: FloatArray) -> FloatArray:
-        """Return the (m,) slope of the variable in which the cubics run against the load."""
+        """Return the (m,) derivatives, with respect to the load, of the variable of the cubics."""
         beyond = load - self.loads[self._bent_from]
         if self._power == 1.0:
             return np.ones_like(load)

@@ -1,4 +1,4 @@
-"""The cheapest rung of the ladder that keeps a tolerance."""
+"""Choice of the cheapest contact solver that keeps a scene's tolerance."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from tactbench.rigs.twin.fidelity import FINE, RUNGS
 from tactbench.rigs.twin.synthesis import Synthesis
 
 TABLE_SHARE = 1 / 3
-"""Share of a tolerance for the load table; the rung may use the rest."""
+"""Share of a tolerance that the load table may use; the contact solver may use the rest."""
 _PROBES = (0.3, 1.0)
-"""Shares of the largest load at which neighbouring rungs are compared."""
+"""Shares of the largest load at which a contact solver is compared with the next more accurate one."""
 _CHOSEN: dict[bytes, tuple[str, float]] = {}
 
 
 def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
-    """Give `run` the cheapest rung that keeps the scene's tolerance, and the estimate of its error.
+    """Give `run` the cheapest contact solver that keeps the scene's tolerance, and the estimate of the solver's error.
 
-    The error of a rung is estimated by its largest difference to the next rung, over two loads and all channels. That
-    of the last rung is at most its difference to the one before, since halving the cells at least halves the error.
+    The error is the solver's largest difference to the next more accurate one, over two loads and all channels. The
+    last solver's error is at most its difference to the one before: halving the cells at least halves the error.
 
     Raises
     ------
     RigError
-        If no rung keeps the tolerance; the message names the smallest error reached.
+        If no contact solver keeps the tolerance; the message states the smallest error reached.
     """
     tolerance = run.scene.simulation.tolerance
     if tolerance is None:
@@ -57,15 +57,15 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
     if error <= 2 * (1 - TABLE_SHARE) * tolerance:
         return last, error / 2
     raise RigError(
-        f"No rung of the ladder keeps an error of {tolerance:g} here: the finest is off by about {error / 2:.2g}.",
+        f"No contact solver keeps the scene's tolerance {tolerance:g}: the finest errs by about {error / 2:.2g}.",
         hint="Give a larger tolerance, or a sensor spec with more cells.",
     )
 
 
 def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> FloatArray | None:
-    """Return the changes of the readings at the probing loads, for an observed slide also in full slip.
+    """Return the readings' changes from rest at the compared loads; for an observed slide, those in full slip, too.
 
-    None if the rung does not support this skin.
+    None if the contact solver `name` does not support this skin.
     """
     try:
         press, read = pressed(run, names, RUNGS[name])

@@ -10,7 +10,7 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 _SERIES_BELOW = 0.35
-"""Below this q the numerator is summed as a series: sinh y - y would cancel."""
+"""Limit of q below which the numerator is summed as a series, because ``sinh y - y`` would cancel."""
 _TERMS = 8
 
 
@@ -40,11 +40,11 @@ def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
 
 
 def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return tangential compliances of the layer's surface under waves: shapes of ``q = k h``, each over ``G k``.
+    """Return two tangential compliances of the layer's surface under waves, times ``G k``, as functions of ``q = k h``.
 
     - under pressure, along the wave: ``C = [(1-2nu) (3-4nu) (cosh 2q - 1) - 2q²] / 2D``. A wave of pressure
       ``p cos kx`` moves the surface by ``-C p sin kx / (G k)``: towards the pressed place where C > 0. C is 0.5 - nu
-      for short waves (Boussinesq), ``-q²/2`` for long ones in an incompressible layer: what is squeezed out flows away;
+      for short waves (Boussinesq), ``-q²/2`` for long ones in an incompressible layer, whose material flows away;
     - under a traction along the wave: ``(1-nu) [(3-4nu) sinh 2q + 2q] / D``, 1 - nu for short waves;
     - under a traction along the crests: ``tanh q``, 1 for short waves.
 
@@ -61,7 +61,7 @@ def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray,
 
 
 def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
-    """Return the layer on `grid`: ``K = E* k / (2 M(k h))``, and ``E_oed / h`` for a uniform pressure.
+    """Return the layer's medium on `grid`: ``K = E* k / (2 M(k h))``, and ``E_oed / h`` for a uniform pressure.
 
     An incompressible layer does not yield to a uniform pressure: its mean deflection is held at zero.
     """

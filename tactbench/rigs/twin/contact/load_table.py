@@ -1,8 +1,8 @@
 """Tables of readings against load, solved at a few loads only.
 
-Quasi-static contact depends on time only through the force. So the skin is solved at a few loads, all wanted readings
-are kept, and a shape-preserving cubic between the nodes answers for every sample. What an interpolant through all
-*other* nodes misses at a node is the reported bound: an interval twice as wide errs by more than the one at hand.
+Quasi-static contact depends on time only through the force. So the skin is solved at a few loads (nodes), and a
+shape-preserving cubic between the nodes gives every sample. The reported error bound is the difference, at a node,
+from an interpolant through all *other* nodes: its interval is twice as wide, and so its error is larger.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from tactbench.rigs.twin.contact.press import AnyPress, whole_skin
 
 _SCOUTS = 4
 _SCOUTS_POWER = 1.7
-"""First loads at ``j^1.7``, above zero: enough to see whether and about where the film closes."""
+"""Exponent of the spacing of the first loads above 0 N, ``j^1.7``: they show roughly where a film closes."""
 _INTERVALS = 6
-"""Intervals of a table without touch-down."""
+"""Number of intervals between nodes of a load table in which the skin never touches the core."""
 _INTERVALS_BELOW, _INTERVALS_ABOVE = 5, 4
-"""Intervals below touch-down, dense at both ends, and above it, dense at its beginning."""
+"""Number of intervals below the load of touch-down on the core (dense at both ends), and above (dense at its start)."""
 _ABOVE_POWER = 0.75
-"""Above touch-down readings follow ``(F - F_td)^0.75`` more smoothly than F: at five nodes above it the rms error over
-caps of 5 to 40 mm is 0.05 to 0.12 counts instead of 0.08 to 0.14, of 0.05 to 0.2 in the square root."""
+"""Exponent of the variable above touch-down, ``(F - F_td)^0.75``: with five nodes there, the rms error over caps of 5
+to 40 mm is 0.05 to 0.12 counts, against 0.08 to 0.14 in F itself and 0.05 to 0.2 in the square root."""
 _LARGEST_GAP = 1.3
-"""A gap between nodes is split when it is wider than this many intervals."""
+"""Width of a gap between nodes, in even intervals, above which the gap is split."""
 _UNSEEN = 3.0
-"""Safety of the reported bound: where readings bend sharply, just above touch-down, the error between two nodes has
-been up to 2.4 times the largest such difference at a node."""
+"""Safety factor of the reported error bound: where readings bend sharply, just above touch-down, the error between two
+nodes was up to 2.4 times the largest difference found at a node."""
 _NARROWEST_N = 0.02
-"""No interval narrower than this is split."""
+"""Width [N] of an interval between nodes below which it is not split."""
 _TOUCH_DOWN_N = 0.01
-"""Width of the bracket of the load at which the film closes."""
+"""Width [N] of the bracket around the load at which the film closes."""
 
 
 _SKIN = 3
-"""Number of the skin's scalars, which stand before the readings."""
+"""Number of skin values (depth, contact radius, fluid pressure) before the readings in each row of a table."""
 
 
 class SkinCurves(NamedTuple):
-    """The skin's scalars at (m,) loads."""
+    """Depth, contact radius and fluid pressure of the skin at (m,) loads."""
 
     depth_mm: FloatArray
     contact_radius_mm: FloatArray
@@ -58,34 +58,34 @@ class LoadTable:
     """Readings of one contact for any load from zero to the largest."""
 
     loads_n: FloatArray
-    """(n,) nodes, the first at zero."""
+    """(n,) loads at which the skin was solved, the first 0 N."""
     readings: FloatArray
-    """(n, channels)"""
+    """(n, channels) readings at the solved loads."""
     depth_mm: float
-    """Depth under the largest load."""
+    """Depth of the indenter under the largest load."""
     residual: float
-    """Largest residual of all nodes."""
+    """Largest relative residual of the solutions at all nodes."""
     touch_down_n: tuple[float, float] | None
-    """Bracket of the load at which the skin touches the core; None if it never does."""
+    """Two loads [N] between which the skin first touches the core; None if it never touches the core."""
     error: FloatArray
     """(channels,) three times the largest difference of a solved reading from the interpolant through the others."""
     interpolant: Interpolant
-    """Depth, contact radius and fluid pressure against load, then the readings."""
+    """Interpolant over load [N] of depth, contact radius and fluid pressure, followed by the readings."""
 
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
         return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))[:, _SKIN:]
 
     def steepest(self, low_n: float, high_n: float) -> FloatArray:
-        """Return the (channels,) largest changes of a reading with force between two forces, per newton.
+        """Return (channels,) upper bounds of the readings' absolute slopes, per newton, between two forces.
 
-        Of this table as it is used, the ends at which it is held included.
+        Forces beyond the table are replaced by its ends.
         """
         low, high = np.clip([low_n, high_n], 0.0, self.loads_n[-1])
         return self.interpolant.steepest(float(low), float(high))[_SKIN:]
 
     def per_mm(self, of: Callable[[FloatArray], FloatArray], force_n: FloatArray) -> FloatArray:
-        """Return the (n, k) slopes against depth, at (n,) forces, of a function `of` force: chords of a fiftieth."""
+        """Return the (n, k) slopes per mm of depth, at (n,) forces, of a function `of` force, from 50 chords."""
         nodes = np.linspace(0.0, float(self.loads_n[-1]), 51)
         deeper = np.diff(self.skin(nodes).depth_mm)
         risen = np.diff(of(nodes), axis=0)
@@ -103,7 +103,7 @@ class _Builder:
         self._press = press
         self._read = read
         self.nodes: dict[float, FloatArray] = {}
-        """Load -> scalars of the skin, then its readings."""
+        """Load [N] -> depth, contact radius and fluid pressure, followed by the readings."""
         self.residual = 0.0
         self.closed: dict[float, bool] = {}
 
@@ -135,10 +135,10 @@ def build_table(
     tolerance: FloatArray,
     most_nodes: int = 14,
 ) -> LoadTable:
-    """Solve and tabulate the (channels,) readings of one contact up to `largest_n`; without load, the rest twice.
+    """Solve and tabulate the (channels,) readings of one contact up to `largest_n`; for 0 N, two equal rows at rest.
 
-    `tolerance` (channels,) is the wanted bound on the interpolation error; at `most_nodes` refining ends even if it is
-    missed: the achieved one is reported.
+    `tolerance` (channels,) is the wanted bound on the interpolation error; refinement ends at `most_nodes` nodes even
+    if the bound is larger. The table states the achieved bound.
     """
     builder = _Builder(press, read)
     builder.node(0.0)
@@ -164,7 +164,7 @@ def build_table(
 
 
 def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
-    """Bracket touch-down and put a node on either side."""
+    """Return two nodes [N] between which the skin first touches the core; None if it never touches the core."""
     closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
     if not closed:
         return None
@@ -192,7 +192,7 @@ def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
 
 
 def _fill(builder: _Builder, touch_down: tuple[float, float] | None, largest_n: float) -> None:
-    """Split the widest gaps until none is much wider than an even spacing, in each part's own coordinate."""
+    """Split the widest gaps between nodes, below and above touch-down, until their spacing is nearly even."""
     if touch_down is None:
         _split_gaps(builder, 0.0, largest_n, _INTERVALS, 0.5)
         return
@@ -203,7 +203,7 @@ def _fill(builder: _Builder, touch_down: tuple[float, float] | None, largest_n: 
 
 
 def _split_gaps(builder: _Builder, start: float, end: float, intervals: int, power: float | None) -> None:
-    """Add nodes from `start` to `end`, even in ``share^power``; None: even in the angle of a half circle."""
+    """Add nodes from `start` to `end` N, spaced evenly in ``share^power``, or (None) in the angle of a half circle."""
 
     def place(load: float) -> float:
         share = min(max((load - start) / (end - start), 0.0), 1.0)
@@ -226,7 +226,7 @@ def _split_gaps(builder: _Builder, start: float, end: float, intervals: int, pow
 def _refine(
     builder: _Builder, touch_down: tuple[float, float] | None, tolerance: FloatArray, most_nodes: int
 ) -> FloatArray:
-    """Add nodes beside the worst predicted one until all are predicted well; return the bound achieved."""
+    """Add nodes beside the one with the largest error until all errors keep `tolerance`; return the bound achieved."""
     while True:
         loads = sorted(builder.nodes)
         fixed = {loads[0], loads[-1], *(touch_down or ())}

@@ -1,7 +1,7 @@
-"""The closed-form rung: the skin as a bed of independent springs (Winkler).
+"""The closed-form contact solver: the skin as a bed of independent springs (Winkler).
 
-The model holds for foams and thin compressible layers, whose cells hardly influence each other. It refuses skins of
-nearly constant volume.
+The model holds for foams and thin compressible layers, whose cells hardly influence each other. Skins of nearly
+constant volume raise an error.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from tactbench.rigs.twin.contact.press import AnyPress, at_rest
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
-"""Limit of the model: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
-to 19 %, least where the contact is wide beside the layer's thickness."""
+"""Largest Poisson's ratio of a layer: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3
+by 0.1 to 19 %, least where the contact is wide compared with the layer's thickness."""
 _CLOSED = 1e-12
 _STEPS = 60
 
 
 class LocalPress(AnyPress):
-    """Solver of one contact cell by cell, given the skin as declared and on its grid, and the (nx, ns) gap.
+    """Contact solver that computes each cell by itself, from the skin's declaration and grid and the (nx, ns) gap.
 
     Raises
     ------
@@ -35,14 +35,14 @@ class LocalPress(AnyPress):
     ) -> None:
         if isinstance(skin, FluidBackedShell):
             raise RigError(
-                "The closed-form rung does not do a skin over a fluid: what is pressed in here comes out there.",
-                hint="Use the default rung.",
+                "The solver 'closed-form' cannot compute a skin over a fluid, whose volume must stay constant.",
+                hint="Set the option rung to default.",
             )
         if isinstance(skin, BondedLayer) and skin.poisson.to("1") > LARGEST_POISSON:
             raise RigError(
-                f"The closed-form rung does not do a layer with Poisson's ratio {skin.poisson.to('1'):g}: above "
-                f"{LARGEST_POISSON} it would be off by a fifth in depth and a factor in force.",
-                hint="Use the default rung.",
+                f"The solver 'closed-form' cannot compute a layer with Poisson's ratio {skin.poisson.to('1'):g}: above "
+                f"{LARGEST_POISSON} its depth would be wrong by a fifth or more.",
+                hint="Set the option rung to default.",
             )
         super().__init__(medium, contact)
         self._gap = gap_mm
@@ -54,8 +54,8 @@ class LocalPress(AnyPress):
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest.
 
-        The force grows ever faster with the approach (the contact widens, foam hardens), so that Newton's steps from
-        above the solution cannot miss it.
+        The force is a convex function of the approach (the contact widens, foam hardens), so that Newton's steps from
+        above the solution always converge.
         """
         if force_n <= 0:
             return at_rest(self.medium)
@@ -73,14 +73,14 @@ class LocalPress(AnyPress):
         residual = abs(self._cell * float(pressure.sum()) - force_n) / force_n
         if residual > 1e-8:
             raise RigError(
-                f"The closed-form rung left a force balance of {residual:.1e} at {force_n:g} N.",
-                hint="Use the default rung, or check the skin's parameters.",
+                f"The solver 'closed-form' misses the force {force_n:g} N by the relative error {residual:.1e}.",
+                hint="Set the option rung to default, or check the skin's parameters.",
             )
         self._depth = depth
         return self.state(force_n, deflection, pressure, depth - self._least_gap, residual)
 
     def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
-        """Return deflection, contact pressure and the summed stiffness at an approach of `depth`.
+        """Return (nx, ns) deflection, (nx, ns) contact pressure and the summed stiffness at an approach of `depth` mm.
 
         Each cell's spring stands in series with the contact's own stiffness; its law hardens, so that Newton's steps
         from the stiff side fall monotonically to the balance.

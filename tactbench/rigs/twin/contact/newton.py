@@ -1,4 +1,4 @@
-"""One load on one skin: the minimiser of a convex energy, by Newton with a Fourier-preconditioned CG inside.
+"""Solver of a skin under one load: minimises a convex energy by Newton's method with Fourier-preconditioned CG.
 
 The energy over deflection ``w`` and approach ``delta`` is
 
@@ -8,9 +8,9 @@ with ``<a, b>`` the sum over cells. Every term is convex in (w, delta) jointly, 
 Hessian in both unknowns is positive definite: one CG solves for the step in w and in delta together. It is piecewise
 smooth (the contact set), so Newton is semismooth and ends in a few full steps once that set settles.
 
-Where the penalty k_s is a means and no property of the skin, its penetration is taken back: the gap is lowered by p/k_s
-and the energy minimised again (Hestenes 1969, Powell 1969: multipliers). Every pass leaves a share of about K/(K + k_s)
-of the penetration, where a stiffer penalty would cost iterations with the root of its stiffness.
+Where the penalty k_s is a numerical means and no property of the skin, its penetration is corrected: the gap is lowered
+by p/k_s and the energy minimised again (method of multipliers; Hestenes 1969, Powell 1969). Every pass leaves a share
+K/(K + k_s) of the penetration; a stiffer penalty would cost iterations with the root of its stiffness.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from tactbench.rigs.twin.contact.spectrum import LowModes
 TOLERANCE = 1e-6
 """Largest relative residual of a solution that is returned."""
 ROUGH_TOLERANCE = 1e-3
-"""Largest relative residual of the passes before the last, whose pressure only lowers the gap of the next."""
+"""Largest relative residual of all passes but the last; their pressures only lower the gap of the next pass."""
 MAX_STEPS = 40
-"""Newton steps before giving up; the hard cases of the tests take up to 25 from a cold start."""
+"""Number of Newton steps after which an error is raised; hard cases take up to 25 steps from the unloaded skin."""
 _ARMIJO = 1e-4
 _HALVINGS = 12
 _EPS = float(np.finfo(np.float64).eps)
@@ -40,12 +40,12 @@ _BALANCED = 1e-12
 
 @dataclass(frozen=True)
 class Solution:
-    """The skin under one load."""
+    """Solved state of the skin under one load."""
 
     vector: FloatArray
     """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
     deflection_mm: FloatArray
-    """(nx, ns)"""
+    """(nx, ns) deflection of the skin."""
     pressure_mpa: FloatArray
     """(nx, ns) contact pressure."""
     residual: float
@@ -53,7 +53,7 @@ class Solution:
 
     @property
     def depth_mm(self) -> float:
-        """Approach of the indenter, counted from where the gap is zero."""
+        """Approach of the indenter from its first touch of the unloaded skin."""
         return float(self.vector[-1])
 
 
@@ -76,7 +76,7 @@ class NewtonSolver:
         self._product = np.empty(self._spectrum.size + 1)
 
     def start(self, force_n: float) -> FloatArray:
-        """Return the unloaded skin with the indenter just touching: a guess for a first load of `force_n`."""
+        """Return the vector of the unloaded skin with the indenter just touching: a first guess for `force_n`."""
         vector = np.zeros(self._spectrum.size + 1)
         # The depth of a single cell, never more than the answer: a piconewton does not start from 1e10 times its depth.
         # From 0.02 mm on the guess would leave the contact's shape behind.
@@ -94,18 +94,18 @@ class NewtonSolver:
         guess
             State of a neighbouring load (its ``vector``).
         tolerance
-            Largest relative residual. Where rounding of the equations' terms is more, what rounding leaves is
-            returned, up to :data:`TOLERANCE`; the solution's residual states it.
+            Largest relative residual. Where rounding of the equations' terms is larger, a residual up to
+            :data:`TOLERANCE` is accepted; the solution states it.
 
         Raises
         ------
         RigError
-            If the residual stays above that; a result that is not one is never returned.
+            If the residual stays above both limits.
         """
         if not force_n > 0 or not math.isfinite(force_n):
             raise RigError(
-                f"The contact solver was given {force_n!r} N; it needs a finite force above zero.",
-                hint="At zero force the skin is at rest and nothing is solved.",
+                f"The contact solver was given a force of {force_n!r} N; a finite force above 0 N is expected.",
+                hint="Leave the solver out at 0 N: the skin is at rest.",
             )
         self._gap = self.gap_mm
         updates = self.medium.contact_updates
@@ -118,7 +118,7 @@ class NewtonSolver:
         return found
 
     def _minimised(self, force_n: float, guess: FloatArray, tolerance: float) -> Solution:
-        """Return the energy's minimiser over the gap at hand; raises RigError."""
+        """Return the state of least energy for the present gap; raises RigError if `tolerance` is missed."""
         load = force_n / self._spectrum.area_mm2
         vector = guess.copy()
         energy, gradient = self._evaluate(vector, load)
@@ -154,12 +154,12 @@ class NewtonSolver:
             vector, energy, gradient, residual = trial, trial_energy, trial_gradient, trial_residual
         raise RigError(
             f"The contact solver left a residual of {residual:.1e} at {force_n:g} N after {MAX_STEPS} Newton steps; "
-            f"{tolerance:.0e} is the largest that is handed out.",
+            f"at most {tolerance:.0e} is allowed.",
             hint="Check the skin's parameters: moduli and stiffnesses must be positive and of sensible size.",
         )
 
     def _evaluate(self, vector: FloatArray, load: float) -> tuple[float, FloatArray]:
-        """Return energy and gradient; leave contact pressure, contact stiffness and tangent behind."""
+        """Return energy and gradient; store contact pressure, contact stiffness and tangent as attributes."""
         spectrum, coefficients, delta = self._spectrum, vector[:-1], float(vector[-1])
         deflection = spectrum.field(coefficients)
         lift = self._lift
@@ -186,10 +186,10 @@ class NewtonSolver:
         return (abs(float(gradient[-1])) + math.sqrt(float(field @ field))) / load
 
     def _rounding(self, vector: FloatArray, load: float) -> float:
-        """Return the part of the residual that is rounding at the state last evaluated, relative to the load.
+        """Return the share of the residual, relative to the load, that is rounding error at the state last evaluated.
 
-        The terms are the skin's own stiffness times its deflection, the contact's pressure, and what that pressure is
-        the difference of: the contact's stiffness times the approach, and times gap and deflection, which are as large.
+        Terms that round: the skin's stiffness times its deflection, the contact pressure, and the larger terms whose
+        difference this pressure is, the contact stiffness times the approach and times gap plus deflection.
         A fast transform of n numbers rounds by about eps log2 n of their norm (Gentleman and Sande 1966).
         """
         stiff = self._diagonal * vector[:-1]
@@ -200,10 +200,10 @@ class NewtonSolver:
         return _EPS * math.log2(vector.size) * (terms + load) / load
 
     def _balanced(self, vector: FloatArray, load: float) -> tuple[float, FloatArray]:
-        """Return the approach that balances `load` on the skin held still, and the (nx, ns) overlap at it.
+        """Return the approach at which the contact carries `load` on an unmoved skin, and the (nx, ns) overlap there.
 
         The load is a convex, piecewise linear function of the approach: a few Newton steps on one number balance it to
-        rounding, from wherever they start.
+        rounding, whatever their start.
         """
         surface = self._gap + self._spectrum.field(vector[:-1])
         approach = float(vector[-1])
@@ -234,8 +234,8 @@ class NewtonSolver:
     def _conjugate_gradients(self, gradient: FloatArray, stiffness: FloatArray, forcing: float) -> FloatArray:
         """Return the Newton step for `gradient`, to a residual of `forcing` in the preconditioner's norm.
 
-        It ends sooner, and keeps the step so far, at a direction along which the energy curves by no more than rounding
-        of the preconditioned value: the step length along it is undetermined, and dividing by it would overflow.
+        The iteration ends early, with the step so far, at a direction along which the energy's curvature is no more
+        than rounding error: the step length there is undetermined, and the division by the curvature would overflow.
         """
         self._coupling = float(self._contact.sum())
         step = np.zeros_like(gradient)
@@ -268,7 +268,7 @@ class NewtonSolver:
     def _solution(self, force_n: float, vector: FloatArray, residual: float) -> Solution:
         """Return the converged state, with an approach that balances the force exactly.
 
-        The residual summed both equations, so the field's stays below it.
+        `residual` sums the errors of both equations, so that the field equation's own error stays below it.
         """
         vector = vector.copy()
         vector[-1], lift = self._balanced(vector, force_n / self._spectrum.area_mm2)
@@ -283,9 +283,9 @@ class NewtonSolver:
 class Preconditioner:
     """Approximate inverse of the Hessian in deflection and approach, with ``medium.low_modes`` exact pairs of modes.
 
-    A skin is stiff against short waves, so the contact's varying stiffness matters for long waves only. These few
-    modes, with the approach, form a small dense matrix that is factorised once a Newton step; the others have their
-    diagonal.
+    A skin is stiff against short waves, so the contact's varying stiffness matters for long waves only. The few long
+    waves and the approach form a small dense matrix, factorised once per Newton step; for all other modes the diagonal
+    of the Hessian is used.
     """
 
     def __init__(self, medium: Medium) -> None:
@@ -318,7 +318,7 @@ class Preconditioner:
         np.reciprocal(self._inverse, out=self._inverse)
 
     def __call__(self, vector: FloatArray) -> FloatArray:
-        """Return the approximate inverse times a flat (size + 1,) vector; the result is overwritten by the next."""
+        """Return the approximate inverse times a (size + 1,) vector; the next call overwrites the returned array."""
         out, right = self._out, self._right
         np.multiply(self._inverse, vector[:-1], out=out[:-1])
         right[:-1] = self._low.take(vector)

@@ -1,4 +1,4 @@
-"""Solution of one contact at any force, each solve starting from those at neighbouring forces."""
+"""Solution of one contact at any force; each solution starts from the solutions at neighbouring forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.rigs.twin.geometry import Contact
 
 
 class AnyPress(ABC):
-    """Solver of one contact for forces in any order, on any rung."""
+    """Interface of every contact solver: one contact, at forces in any order."""
 
     touched_core = False
 
@@ -28,14 +28,14 @@ class AnyPress(ABC):
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
 
     def closing_at(self, force_n: float) -> float:
-        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
         return -np.inf
 
     def state(
         self, force_n: float, deflection_mm: FloatArray, pressure_mpa: FloatArray,
         depth_mm: float, residual: float, fluid_pressure_mpa: float = 0.0,
     ) -> SkinState:  # fmt: skip
-        """Return the state of a solved contact."""
+        """Return the state of the skin for a solved contact."""
         r2 = (self.medium.grid.x_mm[:, None] - self.contact.x_mm) ** 2
         r2 = r2 + (self.medium.grid.s_mm[None, :] - self.contact.s_mm) ** 2
         return SkinState(
@@ -59,15 +59,15 @@ def at_rest(medium: Medium) -> SkinState:
 
 
 def whole_skin(state: SkinState) -> FloatArray:
-    """Return (3,) depth, contact radius and fluid pressure: what is tabulated where no channel is read."""
+    """Return (3,) depth, contact radius and fluid pressure, the values that a table holds beside its channels."""
     return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 class Press(AnyPress):
-    """Solver of one contact by the minimiser of the whole energy.
+    """Contact solver that minimises the energy of the whole skin.
 
-    `medium` has no core yet; `core` adds it when a load first closes the film (None: there is none). `gap_mm` (nx, ns)
-    is the gap at zero approach. With `fluid_pressure` states carry the pressure of the fluid.
+    `medium` has no core yet; the function `core` adds it when a load first closes the film (None: no core). `gap_mm`
+    (nx, ns) is the gap at zero approach. With `fluid_pressure` the returned states hold the pressure of the fluid.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Press(AnyPress):
         )  # fmt: skip
 
     def closing_at(self, force_n: float) -> float:
-        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
         if not self.medium.has_core:
             return -np.inf
         if force_n <= 0:
@@ -122,9 +122,9 @@ class Press(AnyPress):
         return solution
 
     def _started(self, force: float) -> Solution:
-        """Solve from the neighbouring loads' states; from rest where that leads nowhere.
+        """Solve from the neighbouring loads' states; if the solver fails from there, from the skin at rest.
 
-        A state guessed for loads of a fraction of a piconewton is off by more than such a load can move.
+        For loads below a piconewton the error of a guessed state is larger than the deflection under such a load.
         """
         guess = self._guess(force)
         if guess is not None:
@@ -153,7 +153,7 @@ class Press(AnyPress):
         return guess
 
     def _fluid_pressure(self, solution: Solution) -> float:
-        """Return the multiplier of the constant volume: the mean contact pressure that the skin does not carry."""
+        """Return the fluid's pressure, the part of the mean contact pressure that the skin itself does not carry."""
         if not (self.medium.zero_mean and self._wants_fluid_pressure):
             return 0.0
         local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))

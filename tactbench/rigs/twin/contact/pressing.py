@@ -1,4 +1,4 @@
-"""Solver and transducer of one recording's skin at a given fidelity."""
+"""Construction of the contact solver and the transducer for one simulated recording."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     NotApplicable
         If the transducer cannot give a channel.
     RigError
-        If this rung is known to be wrong for this skin.
+        If the chosen contact solver does not support this skin.
     """
     press = press_of(run, fidelity)
     if not names:
@@ -63,7 +63,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
 
 
 def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
-    """Return the solver of the loads of `run`; raises as :func:`pressed`."""
+    """Return the contact solver of `run`; raises the errors of :func:`pressed`."""
     skin = run.skin
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     gap = gap_mm(grid, run.contact, skin.sheet)
@@ -79,12 +79,12 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
 
 
 def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:
-    """Return the sensor's transducer, with a check of each result."""
+    """Return the sensor's transducer, wrapped in a check that each result is (len(names),) finite numbers."""
     try:
         factory: TransducerFactory = load_object(sensor.transducer or "")
         transducer: Transducer = factory(sensor.spec, grid, names)
     except RigError as error:
-        raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
+        raise NotApplicable(f"The transducer of {sensor.name} cannot be built: {error}", hint=error.hint) from error
 
     def read(state: SkinState) -> FloatArray:
         readings = np.asarray(transducer(state), dtype=np.float64)
@@ -100,7 +100,7 @@ def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:
 
 
 def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
-    """Return a slide's direction and static friction; None if nothing slides or no channel looks along the skin."""
+    """Return a slide's direction and static friction; None without a slide or a channel that responds to shear."""
     slide = run.scene.slide
     if slide is None or not run.tangential or not run.load.largest_n > 0:
         return None
@@ -109,7 +109,7 @@ def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
 
 
 def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:
-    """Return the medium a spec declares, on `grid`; only its own module is imported.
+    """Return the medium on `grid` of a skin in a sensor's spec; only the module of this kind of skin is imported.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""An elastic sleeve over an incompressible fluid: the BioTac's skin."""
+"""Model of the BioTac's skin: an elastic sleeve over an incompressible fluid."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tactbench.rigs.twin.geometry import outer_radius_mm
 
 
 def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
-    """Return the shell on `grid`, without its core.
+    """Return the medium of the fluid-backed shell on `grid`, without the core.
 
     Shallow circular cylindrical shell (Donnell, Mushtari, Vlasov): ``K = D k⁴ + T k² + (E t / Rm²) kx⁴ / k⁴`` with
     ``D = E t³ / (12 (1 - nu²))``; the fluid keeps the mean deflection at zero and its pressure is that constraint's
-    multiplier. At the tip of a dome the skin runs on: the sheet is mirrored there, and at its rear.
+    multiplier. The sheet is mirrored at the tip of a dome, where the skin continues, and at its rear.
     """
     young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
     spectrum = Spectrum(grid, mirrored=skin.sheet.dome is not None)
@@ -47,10 +47,9 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
     """Return the clamp ``c (max(e^-(x - a)/l, e^-(b - x)/l) + e^-(arc/2 - |s|)/l)``, never above c from the ends.
 
     At the tip of a dome, b, nothing is clamped. ``a`` and ``b`` lie half a cell of the *sheet's own* division inside
-    its ends: there the ends' clamp has its full stiffness, on whatever grid, so that a finer one converges to the same
-    skin. The seam's distance counts from the sheet's edge. The reference figures of the solver hold for this choice;
-    measured from the sheet's ends instead, the clamp is weaker by half a cell's decay and the approach under a flat
-    surface grows by 8 %.
+    its ends: there the ends' clamp has its full stiffness on every grid, so that finer grids converge to the same skin.
+    The seam's distance counts from the sheet's edge. The solver's reference figures hold for this choice; a clamp
+    measured from the sheet's ends is weaker by half a cell's decay, and the approach under a flat surface 8 % larger.
     """
     length, sheet = skin.clamp_length.to("mm"), skin.sheet
     x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")

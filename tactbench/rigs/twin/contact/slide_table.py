@@ -5,10 +5,10 @@ of Ciavarella (1998) and Jaeger (1998), the difference of two contacts without f
 
     q = A p(P) - B p(P*),    P* = (c/a)³ P the load inside the part that sticks,    A P - B P* = Q
 
-A = B = mu after a first push; a contact that slips as a whole has B = 0. What lies between (a push after a slip) is
-``q = Q/P p(P) + b mu [(P*/P) p(P) - p(P*)]`` with b from 0 to 1: a share of the pressure, and b times what a first
-push would have apart from that. So are the readings: exact for b = 0 and b = 1, and for every b where they are linear
-in traction.
+A = B = mu after a first push; a contact that slips as a whole has B = 0. A push after a slip lies between the two:
+``q = Q/P p(P) + b mu [(P*/P) p(P) - p(P*)]`` with b from 0 to 1, a share of the pressure plus b times the rest of a
+first push's traction. The readings are composed likewise: exactly for b = 0 and b = 1, and for every b if they are
+linear in traction.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tactbench.rigs.twin.contact.tangential import Direction, TangentialResponse
 _SHARES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Shares of mu P carried by a traction proportional to the pressure; a share of 0 changes nothing."""
 _PUSHES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-"""Shares of mu P of a first push; at 0 and 1 the traction is proportional to the pressure, too."""
+"""Shares of mu P carried after a first push; for 0 and 1 this traction, too, is proportional to the pressure."""
 
 
 def traction_shares(
@@ -53,10 +53,10 @@ def dragged_state(
     outer_by: float,
     inner_by: float,
 ) -> SkinState:
-    """Return `state` with a traction ``outer_by p(state) - inner_by p(inner)`` in `direction`, and what it moves.
+    """Return `state` with the traction ``outer_by p(state) - inner_by p(inner)`` in `direction` and its displacement.
 
-    Where a pressure has fallen under more load (under a shell's dent, under a cover's edge), the inner one is cut to it
-    and the rest of it raised to the same force: no friction holds what does not press.
+    Where more load has lowered the pressure (in a shell's dent, at a cover's edge), the inner pressure is limited to
+    the lower one and scaled elsewhere to keep its force: friction cannot hold a place without pressure.
     """
     touched, inner_mpa = state.pressure_mpa > 0, np.minimum(inner.pressure_mpa, state.pressure_mpa)
     if inner_mpa.any():
@@ -75,9 +75,9 @@ class SlideTable:
     friction: float
     """Static friction coefficient mu."""
     proportional: Interpolant
-    """(m,) loads -> (m, shares * channels): readings under a share of the pressure, less those without."""
+    """(m,) loads -> (m, shares * channels) changes of the readings by a traction proportional to the pressure."""
     partial: Interpolant
-    """(m,) loads -> (m, pushes * channels): readings after a first push, less those under the same share."""
+    """(m,) loads -> (m, pushes * channels) readings after a first push, less those under a proportional traction."""
 
     def __call__(
         self, force_n: FloatArray, load_n: FloatArray, tangential_n: FloatArray, stick_ratio: FloatArray
@@ -101,7 +101,7 @@ def build_slide_table(
     direction: Direction,
     friction: float,
 ) -> SlideTable:
-    """Return the slide table at the loads of `table`, which was made with the same `press` and `read`."""
+    """Return the slide table at the loads of `table`, a load table made with the same `press` and `read`."""
     along = tangential_of(skin, press.medium.grid)
     proportional, partial = [], []
     for load, plain in zip(table.loads_n.tolist(), table.readings, strict=True):

@@ -1,7 +1,7 @@
-"""Fields of the skin as Fourier coefficients in one flat real vector.
+"""Conversion between fields of the skin and flat real vectors of their Fourier coefficients.
 
 The coefficients are scaled so that the dot product of two vectors is the sum over cells of the product of the fields:
-energy, gradient and conjugate directions live in Fourier space, where the skin's own stiffness is a diagonal.
+energy, gradient and conjugate directions are computed in Fourier space, where the skin's own stiffness is a diagonal.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from tactbench.plugin.simulation import SkinGrid
 
 
 class Spectrum:
-    """Transforms of one grid: of a periodic sheet, or of one that is mirrored at both ends along x.
+    """Fourier transforms on one grid, of a periodic sheet or of a sheet mirrored at both ends along x.
 
-    There fields are sums of cosines and go on as their own images.
+    Along x, fields of a mirrored sheet are sums of cosines and continue as their own images.
     """
 
     def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
@@ -26,16 +26,16 @@ class Spectrum:
         nx, ns = self.shape
         self.half = (nx, ns // 2 + 1)
         self.size = 2 * self.half[0] * self.half[1]
-        """Length of a flat vector."""
+        """Number of coefficients in a flat vector."""
         dx, ds = grid.cell_mm
         self.area_mm2 = dx * ds
-        """Of one cell."""
+        """Area of one cell of the grid."""
         kx = np.pi / (nx * dx) * np.arange(nx) if mirrored else 2 * np.pi * np.fft.fftfreq(nx, dx)
         ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
         self.kx = kx[:, None]
-        """(nx, 1) axial wave number, 1/mm."""
+        """(nx, 1) wave numbers of the modes along x, 1/mm."""
         self.k2 = self.kx**2 + ks**2
-        """(nx, ns//2+1) squared wave number, 1/mm²."""
+        """(nx, ns//2+1) squared wave numbers of the modes, 1/mm²."""
         # Columns between the first and the last stand for themselves and their conjugates.
         weight = np.full((1, self.half[1]), math.sqrt(2.0))
         weight[0, 0] = 1.0
@@ -67,7 +67,7 @@ class Spectrum:
         return real
 
     def diagonal(self, multiplier: FloatArray) -> FloatArray:
-        """Return the (size,) diagonal that multiplies vectors like the (nx, ns//2+1) `multiplier`."""
+        """Return the (size,) factors that act on a flat vector as the (nx, ns//2+1) `multiplier` acts on the modes."""
         return np.repeat(multiplier.reshape(-1), 2)
 
 
@@ -75,7 +75,7 @@ class LowModes:
     """The softest Fourier modes as an orthonormal real basis, in which a varying stiffness is a small matrix.
 
     A local stiffness D(x) couples modes k and k' by its own Fourier coefficients at ``k - k'`` and ``k + k'``; so
-    the matrix is gathered from one transform of D instead of being integrated.
+    the matrix is assembled from one transform of D, without integration.
     """
 
     def __init__(self, spectrum: Spectrum, stiffness: FloatArray, *, count: int, zero_mean: bool) -> None:
@@ -127,12 +127,12 @@ class LowModes:
         self._stiffness = np.concatenate([flat[chosen], flat[chosen], flat[:constant]])
 
     def take(self, vector: FloatArray) -> FloatArray:
-        """Return the (size,) coefficients of a flat vector."""
+        """Return the (size,) coefficients of the low modes in a flat vector."""
         taken: FloatArray = vector[self._places] * self._scales
         return taken
 
     def put(self, coefficients: FloatArray, vector: FloatArray) -> None:
-        """Overwrite the low modes of a flat vector."""
+        """Overwrite the low modes of a flat vector by their (size,) coefficients."""
         vector[self._places] = coefficients / self._scales
         vector[self._mirror_places] = coefficients[self._mirror_from] * self._mirror_scales
 

@@ -1,4 +1,4 @@
-"""The effects of contact: pressing the skin, and reading the channels from it."""
+"""Effects by which the twin simulates contact: pressing the skin, and computing the channels from its state."""
 
 from __future__ import annotations
 
@@ -39,31 +39,31 @@ _TABLES: dict[bytes, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
-    """Refuse a contact that cannot be resolved; it is solved when a reading is first needed."""
+    """Raise an error for a contact that the grid cannot resolve; the solver runs when a reading is first needed."""
     sheet = run.skin.sheet
     check_contact(skin_grid(sheet, run.fidelity.cells(sheet)), run.contact)
 
 
 def forget_tables() -> None:
-    """Drop all tables of this process: the next recording solves its contact again."""
+    """Drop all load tables that this process has kept: the next recording solves its contact again."""
     _TABLES.clear()
 
 
 def watch_fluid(run: Synthesis) -> None:
-    """Request the pressure of the fluid with every solved load."""
+    """Request that every solved load states the pressure of the fluid in the skin."""
     run.fluid_pressure = True
 
 
 def watch_shear(run: Synthesis) -> None:
-    """Request the tangential state of the skin with every solved load."""
+    """Request that every solved load states the tangential displacement and traction of the skin."""
     run.tangential = True
 
 
 def read_skin(run: Synthesis) -> None:
-    """Add each channel's response: gain times its reading under the effective force, less its reading at rest.
+    """Add each channel's response: its gain times the change from rest of its reading under the effective force.
 
-    A slide adds what its tangential force changes in a reading at that normal force, a vibration of the skin its size
-    times the reading's slope with depth there.
+    A slide adds the change by the tangential force at the same normal force; a vibration of the skin adds its amplitude
+    times the slope of the reading with depth.
     """
     tabulated, names = _tables(run), read_names(run)
     table, slide = tabulated.table, tabulated.slide
@@ -104,7 +104,7 @@ def _tables(run: Synthesis) -> _Tabulated:
 def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
     """Return the radius of the contact under (n,) forces, for laws of a round contact.
 
-    Of other contacts it is that of a circle with the same mean square distance of the load, and a remark states so.
+    For other contacts: the radius of a circle with the same mean square distance of the load, stated in a remark.
     """
     if run.contact.shape is not None:
         run.drawn["remark round"] = (
@@ -117,13 +117,13 @@ def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
 def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
     """Return the load table of the skin up to a load, without channels: for effects that determine the load.
 
-    It may reach past the rim of a cap: the final load is checked when the channels are read.
+    The load may press a cap in beyond its rim: only the final load is checked, when the channels are read.
     """
     return _tabulated(run, [], largest_n, only_skin=True).table
 
 
 def read_names(run: Synthesis) -> list[str]:
-    """Return the names of the channels that the sensor's transducer answers for, in the sensor's order."""
+    """Return the names of the channels that the sensor's transducer computes, in the sensor's order."""
     return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
 
 
@@ -164,14 +164,14 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
-"""Tolerances of depth and contact radius [mm] and of pressure [MPa] where no channel determines one: a hundredth of
-their values under a few newtons."""
+"""Tolerances of depth and contact radius [mm] and of pressure [MPa] for a table without channels: a hundredth of their
+values under a few newtons."""
 
 
 def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
-    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway.
+    """Return the (channels,) wanted bounds of the load table's error: multiples of the noise and rounding (rms).
 
-    A scene that states a tolerance gets a third of that, if it is less: the rung has the rest.
+    They are at most a third of a tolerance stated by the scene, of which the contact solver may use the rest.
     """
     if not names:
         return _NO_CHANNELS_TOLERANCE

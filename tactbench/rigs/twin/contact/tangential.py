@@ -1,7 +1,7 @@
 """Tangential displacement of a skin's outer surface under pressure and under traction.
 
-The answer is linear in pressure and traction. That a traction also lifts the surface, and so changes the pressure, is
-neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an incompressible layer.
+The displacement is linear in pressure and traction. A traction's effect on the surface's height, and so on the
+pressure, is neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an incompressible layer.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
 Direction = tuple[float, float]
-"""Unit vector along x and s."""
+"""Direction of a slide on the skin: the components of a unit vector along x and s."""
 
 
 class TangentialResponse:
-    """Tangential response of a skin; here that of a contact that moves as a whole, while the skin around it stays.
+    """Tangential response of a skin; by default the contact moves as a whole and the skin around it stays.
 
-    Its displacement is the force over the half-space's stiffness, as for `friction`. A press moves nothing, as in a
-    foam of independent columns.
+    The contact's displacement is the tangential force over the stiffness of a half-space, as for `friction`. A normal
+    force moves nothing along the skin, as in a foam of independent columns.
     """
 
     def __init__(self, skin: Skin) -> None:
@@ -62,7 +62,7 @@ def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinSta
 
 
 class _Spectral:
-    """Waves of a periodic sheet, or of one that its ends along x mirror: half of a periodic one."""
+    """Fourier transforms of a periodic sheet, or of a sheet mirrored at its ends along x: half of a periodic one."""
 
     def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
         self._mirrored, self._cells = mirrored, grid.x_mm.size
@@ -80,7 +80,7 @@ class _Spectral:
         """(2, nx, ns//2+1) derivatives along x and s."""
 
     def filtered(self, field: FloatArray, multiplier: npt.NDArray[np.complex128]) -> FloatArray:
-        """Return the (2, nx, ns) fields whose waves are those of (nx, ns) `field` times (2, nx, ns//2+1)."""
+        """Return the (2, nx, ns) fields whose modes are those of (nx, ns) `field` times (2, nx, ns//2+1) factors."""
         whole = np.concatenate([field, field[::-1]]) if self._mirrored else field
         return np.asarray(np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells])
 
@@ -89,7 +89,7 @@ class _Shell(TangentialResponse):
     """The shallow shell's own membrane displacements, and the turn of its normal at the outer face.
 
     Donnell: ``k⁴ u = i kx (ks² - nu kx²) w / R``, ``k⁴ v = -i ks (ks² + (2 + nu) kx²) w / R`` for a deflection w
-    towards the core; the outer face moves by ``t/2 grad w`` more. No clamp holds the sheet along itself.
+    towards the core; the outer face moves by ``t/2 grad w`` more. The clamp does not act in the sheet's own plane.
     """
 
     def __init__(self, skin: FluidBackedShell, grid: SkinGrid) -> None:
@@ -106,7 +106,7 @@ class _Shell(TangentialResponse):
 
 
 class _Layer(TangentialResponse):
-    """A layer bonded to a rigid base: closed forms wave by wave (:func:`shear_shapes`)."""
+    """Tangential response of a layer bonded to a rigid base: a closed form for each wave (:func:`shear_shapes`)."""
 
     def __init__(self, skin: BondedLayer, grid: SkinGrid) -> None:
         young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")

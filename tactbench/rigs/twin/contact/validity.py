@@ -1,4 +1,4 @@
-"""Limits of the contact model: checks that refuse a solved contact, and remarks that its recording keeps."""
+"""Limits of the contact model: checks that raise an error for a solved contact, and remarks for its recording."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tactbench.rigs.twin.geometry import STEEPEST, around_mm
 from tactbench.rigs.twin.shapes import RIM
 
 RESOLVED_CELLS = 3.0
-"""Contact radius, in cells, from which a contact follows the physics and not the mesh. Measured on the ideal grid
-with a cap of 2 mm at eight places: against cells a quarter as wide, the depth is off by up to 23 % at 0.9 cells, 6 % at
+"""Smallest contact radius, in cells, at which the mesh does not affect the result. Measured on the ideal grid with a
+cap of 2 mm at eight places: against cells a quarter as wide, the depth is off by up to 23 % at 0.9 cells, 6 % at
 1.7, 2 % at 2.7 and 1.4 % at 3.4."""
 HELD_AGAINST_N = 5.0
-"""Largest load of the paper (Karl et al. 2016) and of the solver's reference values."""
+"""Largest load [N] in Karl et al. 2016 and in the reference values for the solver; larger ones get a remark."""
 INTO_THE_CORE = 0.1
-"""Share of the film by which the skin may pass into the core: its penalty is softer than a core. Assumed."""
+"""Share of the film's thickness by which the skin may sink into the core, whose penalty spring is soft. Assumed."""
 AT_THE_EDGE = 0.01
-"""Share of the load outside the active skin above which there is a remark. Assumed."""
+"""Share of the load outside the active skin above which the recording gets a remark. Assumed."""
 
 
 def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
-    """Refuse a load under which the skin touches beyond the rim of the cap.
+    """Raise an error for a load under which the skin touches the indenter beyond the rim of the cap.
 
     Raises
     ------
@@ -39,8 +39,8 @@ def check_reach(press: AnyPress, force_n: float, sheet: SkinSheet) -> None:
     along, across, _ = around_mm(press.medium.grid, press.contact, sheet)
     if np.any(press(force_n).pressure_mpa[np.hypot(along, across) >= RIM * press.contact.radius_mm] > 0):
         raise RigError(
-            f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks in past its rim: what would "
-            "touch there is not part of it.",
+            f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks into the skin beyond its rim, "
+            "where the cap ends.",
             hint="Press with less force, or with a larger cap.",
         )
 
@@ -65,7 +65,7 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
             f"the contact is {cells:.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} it follows the mesh"
         )
     if force > HELD_AGAINST_N:
-        found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
+        found["remark load"] = f"{force:g} N is beyond {HELD_AGAINST_N:g} N, up to which the model was compared"
     found |= _too_deep(press.medium, press(force).deflection_mm)
     along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, sheet))
     along, across = along[pressure > 0], across[pressure > 0]
@@ -80,7 +80,7 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
             "steeper than 45 degrees"
         )
     if sheet.dome is not None and press.contact.x_mm > sheet.dome.start.to("mm"):
-        found["remark dome"] = "the contact is on the dome, where the model has been held against no real press"
+        found["remark dome"] = "the contact is on the dome, where the model was never compared with real presses"
     share = float(pressure[~_active(sheet, press.medium.grid)].sum() / pressure.sum())
     if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"
@@ -88,14 +88,14 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
 
 
 def _narrow_cells(pressure: FloatArray) -> float:
-    """Return the shorter half-axis of the ellipse whose cells scatter as those that are touched do, in cells."""
+    """Return, in cells, the shorter half-axis of an ellipse with the second moments of the touched area."""
     places = np.argwhere(pressure > 0)
     scatter = np.atleast_2d(np.cov(places.T, bias=True)) + np.eye(2) / 12  # a cell is a square
     return 2.0 * math.sqrt(float(np.linalg.eigvalsh(scatter)[0]))
 
 
 def _active(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_]:
-    """Return which (nx, ns) cells are active skin: those of the pad, or without one all but the outermost."""
+    """Return (nx, ns) True for cells of active skin: the pad's cells, or without a pad all but the outermost."""
     x_mm, s_mm = grid.x_mm, np.abs(grid.s_mm)
     if sheet.pad is None:
         along, across = (x_mm > x_mm[0]) & (x_mm < x_mm[-1]), s_mm < s_mm[-1]

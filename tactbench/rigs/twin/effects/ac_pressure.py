@@ -13,8 +13,8 @@ from tactbench.rigs.twin.synthesis import Synthesis
 def apply(run: Synthesis) -> None:
     """Add the band-passed pressure of the fluid to every channel of dynamic pressure.
 
-    The fluid's pressure follows the load; a vibration of the skin adds its size times the pressure's slope with depth
-    at that load, so that its loudness needs no parameter of its own.
+    The fluid's pressure follows the load; a vibration of the skin adds its amplitude times the slope of the pressure
+    with depth at that load, so that no separate parameter is needed.
     """
     table = skin_under_load(run)
     for track in run.tracks:
@@ -31,12 +31,12 @@ def apply(run: Synthesis) -> None:
 def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
     """Return (n,) pressures, linear between samples, filtered by the band of a channel.
 
-    A first-order high-pass and a first-order low-pass with their corners at the band's ends: the makers state the
-    ends, no source the order. Both are exact for any step.
+    The filters are a first-order high-pass and a first-order low-pass with their corners at the band's ends, exact for
+    any step. The makers state the ends; no source states the order.
     """
     if channel.band is None:
         raise NotApplicable(
-            f"{channel.name} states no band: what it lets through of a pressure is not known.",
+            f"{channel.name} states no band (Hz), which is needed to filter its pressure.",
             hint="State the channel's band in the sensor's spec.",
         )
     low, high = channel.band.lower, channel.band.upper
@@ -47,7 +47,7 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
 def _pa_per_count(channel: ChannelSpec) -> float:
     if channel.scale is None:
         raise NotApplicable(
-            f"{channel.name} states no scale: its counts cannot be computed from a pressure.",
+            f"{channel.name} states no scale (Pa/count), which is needed to convert its pressure to counts.",
             hint="State the channel's scale (Pa/count) in the sensor's spec.",
         )
     return channel.scale.to("Pa/count")

@@ -1,7 +1,7 @@
-"""Friction against speed, and its memory: the LuGre bristle with exact steps.
+"""Friction that depends on speed and history: the LuGre bristle with exact steps.
 
-Canudas de Wit, Olsson, Åström and Lischinsky 1995: ``dz/dt = v - |v| z/g(v)``. With v and g held over a step it is
-a decay with the way travelled, whatever the step: ``z' = b z + (1 - b) g sign(v)``, ``b = exp(-|v| dt/g)``.
+Canudas de Wit, Olsson, Åström and Lischinsky 1995: ``dz/dt = v - |v| z/g(v)``. With v and g held over a step, z decays
+exponentially with the distance travelled: ``z' = b z + (1 - b) g sign(v)``, ``b = exp(-|v| dt/g)``.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.memory import recurrence
 
 COULOMB_MM_S = 1e-6
-"""Below this Stribeck speed friction falls at once: nothing measured is slower."""
+"""Stribeck speed below which friction falls from static to kinetic at once; all measured speeds are higher."""
 NOTHING_MM = 1e-12
-"""Deflections below this, a femtometre, count as zero."""
+"""Deflection, a femtometre, below which a deflection counts as zero."""
 
 
 def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s: float) -> float:
-    """Return friction over load at a speed: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
+    """Return the friction coefficient at a speed: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
 
-    Its slope is steepest at rest, so that the slowest slide is the least stable. ``v_s = 0`` (or below a nanometre a
-    second): Coulomb's two coefficients.
+    The coefficient falls fastest at rest, so that the slowest slide is the least stable. For ``v_s`` below a nanometre
+    per second it has two values only, static and kinetic (Coulomb).
     """
     if stribeck_mm_s < COULOMB_MM_S:
         return kinetic if speed_mm_s else static
@@ -33,8 +33,8 @@ def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s:
 def bristle(t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float) -> FloatArray:
     """Return the (n,) deflection of the bristle at (n,) ascending times and a constant speed, from `start_mm` on.
 
-    A speed of 0 and equal neighbouring times change nothing. `limit_mm` (n,) is the deflection of steady sliding ``g``,
-    at least 0, held from each sample to the next; where it is 0 nothing is held.
+    At a speed of 0, and between equal times, the deflection stays. `limit_mm` (n,) is the deflection ``g`` of steady
+    sliding, at least 0 and constant from each sample to the next; where it is 0, motion leaves no deflection.
     """
     way = abs(speed_mm_s) * np.diff(t_s, prepend=t_s[:1])
     held = np.concatenate([limit_mm[:1], limit_mm[:-1]])
@@ -47,9 +47,9 @@ def bristle(t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: 
 def bristle_below(
     t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float, most_mm: FloatArray
 ) -> FloatArray:
-    """Return :func:`bristle` that at no sample holds more than `most_mm` (n,), but slides back at once.
+    """Return the deflection of :func:`bristle`, limited at every sample to at most `most_mm` (n,).
 
-    Nearly always it never would; only where it would, sample follows sample.
+    The samples are computed one after the other only if the limit is reached, which is rare.
     """
     free = bristle(t_s, speed_mm_s, limit_mm, start_mm)
     over = free > most_mm

@@ -1,7 +1,7 @@
-"""Predicates that decide which effects a scene calls for, without solving a contact.
+"""Functions that decide which effects a scene needs, without solving a contact.
 
-Each takes the scene and the sensor's spec and returns a Reason: the decision, its text, and a bound on what leaving the
-effect out would change.
+Each function takes the scene and the sensor's spec and returns a Reason: the decision, its text, and a bound on the
+change of the readings if the effect is left out.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NO_FLUID = "the skin holds no fluid"
 
 
 def _no(text: str, unit: str = "count") -> Reason:
-    """Return the reason of an effect that changes nothing."""
+    """Return a Reason to leave out an effect that would change nothing."""
     return Reason(False, text, 0.0, unit)
 
 
@@ -27,7 +27,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> list[Nuisances]:
 
 
 def _largest(scene: Scene, sensor: SensorSpec, *fields: str) -> Quantity | None:
-    """Return the largest quantity in these fields of the observed kinds' nuisances; None if the spec states none."""
+    """Return the largest of the nuisances `fields` of all observed channel kinds; None if the spec states none."""
     found = [getattr(nuisances, field) for nuisances in _observed(scene, sensor) for field in fields]
     return max((one for one in found if one is not None), key=lambda quantity: quantity.value, default=None)
 
@@ -44,7 +44,7 @@ def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason
 
 
 def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a motor under force control presses."""
+    """Decide whether the scene includes the force loop: a motor under force control presses the indenter."""
     drive = scene.drive
     if drive is None:
         return _no("the scene declares no drive: the force follows its profile, 0 N off", "N")
@@ -56,14 +56,14 @@ def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether the skin is pressed."""
+    """Decide whether the scene includes contact: an indenter presses the skin."""
     if not scene.profile.largest_n > 0:
         return _no(NO_LOAD)
     return Reason(True, f"{scene.indenter} pressed with up to {scene.profile.largest_n:g} N")
 
 
 def core(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether the skin may touch a core under a fluid film."""
+    """Decide whether the scene includes the rigid core: the skin may touch it through a fluid film."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return _no("the skin has no core under a fluid film")
     if not scene.profile.largest_n > 0:
@@ -73,28 +73,28 @@ def core(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether the skin holds a fluid whose pressure a channel reads."""
+    """Decide whether the scene includes fluid pressure: an observed channel reads that of a fluid in the skin."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return _no(NO_FLUID)
     return Reason(True, "an observed channel reads the pressure of the fluid")
 
 
 def shear(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether an observed channel reads the tangential state of the skin."""
+    """Decide whether the scene includes shear: an observed channel reads the tangential state of the skin."""
     if not scene.profile.largest_n > 0:
         return _no(NO_LOAD)
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
-        return _no("no observed channel looks along the skin")
+        return _no("no observed channel responds to tangential motion of the skin")
     slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
-    return Reason(True, f"{' and '.join(looking)} channels look at how a press moves the skin along itself{slides}")
+    return Reason(True, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a response may lag behind a load that changes.
+    """Decide whether the scene includes creep: readings may lag behind a changing load.
 
-    The amount depends on the slope of the readings, which only the scene's load table gives: the effect itself decides
-    after the skin is solved (`tactbench.rigs.twin.effects.creep`).
+    The size of the lag depends on the slope of the readings, known only from the load table: the effect is possibly
+    left out after the contact is solved (`tactbench.rigs.twin.effects.creep`).
     """
     terms = [term for nuisances in _observed(scene, sensor) for term in nuisances.creep]
     share = sum(term.fraction.to("1") for term in terms)
@@ -108,7 +108,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return that the observed channels read the skin."""
+    """Return the Reason to compute the observed channels from the state of the skin."""
     return Reason(True, f"{sensor.principle} channels read the skin")
 
 
@@ -116,7 +116,7 @@ def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether channels of one unit have different gains."""
+    """Decide whether the scene includes gain differences between the channels of one sensor unit."""
     scatter = _largest(scene, sensor, "gain_scatter")
     unit = None if scene.first_unit else _largest(scene, sensor, "unit_gain")
     within, between = (0.0 if one is None else one.to("1") for one in (scatter, unit))
@@ -127,7 +127,7 @@ def gain(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether another unit rests at other levels than the spec states."""
+    """Decide whether the scene includes rest levels that differ between sensor units."""
     if scene.first_unit:
         return _no("unit 1 is the one that the spec describes")
     largest = _largest(scene, sensor, "unit_rest_shared", "unit_rest_own")
@@ -137,7 +137,7 @@ def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether channels of one unit rest at different levels."""
+    """Decide whether the scene includes rest levels that differ between the channels of one sensor unit."""
     spread = sensor.parameters.get("rest_spread")
     if spread is None or not spread.value:
         return _no("the spec states rest levels channel by channel")
@@ -145,7 +145,7 @@ def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def offset(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether recordings start from different levels."""
+    """Decide whether the scene includes reading offsets that differ between recordings."""
     environment, session = scene.environment, _largest(scene, sensor, "offset_session")
     if session is not None and session.value and environment.session_offset_scale:
         return _scaled(environment.session_offset_scale, session, "offset", "levels move by {} (sd) between sessions")
@@ -155,7 +155,7 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether rest levels rise to a warm value."""
+    """Decide whether the scene includes the rise of the rest levels while the sensor warms up."""
     rise, tau = _largest(scene, sensor, "warm_up"), _largest(scene, sensor, "warm_up_tau")
     reason = _scaled(scene.environment.drift_scale, rise, "warm-up", "rest levels rise by {} from power-on")
     if not reason.called_for or tau is None or reason.change is None:
@@ -165,18 +165,18 @@ def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether channels drift freely."""
+    """Decide whether the scene includes a slow random drift of each channel."""
     spread = _largest(scene, sensor, "wander")
     return _scaled(scene.environment.drift_scale, spread, "free drift", "channels wander by {} (sd)")
 
 
 def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether every sample has its own error."""
+    """Decide whether the scene includes white noise, an independent error of every sample."""
     return _scaled(scene.environment.noise_scale, _largest(scene, sensor, "white"), "white noise", "noise of {} (sd)")
 
 
 def hum(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether dynamic pressure hums at rest."""
+    """Decide whether the scene includes a hum of the dynamic pressure without contact."""
     size = sensor.parameters.get("hum")
     if "ac_pressure" not in scene.observe:
         return _no("no channel of dynamic pressure is observed")
@@ -190,7 +190,7 @@ def hum(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def converter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return that readings are always stored through the converter."""
+    """Return the Reason to apply the analog-to-digital converter, which every scene includes."""
     step = _largest(scene, sensor, "step")
     stated = f"steps of {step}, " if step is not None and step.value else ""
     half = None if step is None else step.value / 2
@@ -198,7 +198,7 @@ def converter(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether the reference force differs from the true one."""
+    """Decide whether the scene includes noise of the reference force sensor."""
     noise = scene.environment.force_noise
     if not noise.value:
         return _no("the scene's force sensor is free of noise", "N")
@@ -206,7 +206,7 @@ def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def force_filter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether the reference force is recorded behind a low-pass."""
+    """Decide whether the scene includes a low-pass filter of the reference force."""
     cutoff = scene.environment.force_filter
     if cutoff is None:
         return _no("the force is recorded unfiltered: no cut-off, 0 N off", "N")
@@ -229,7 +229,7 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def friction(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether something moves over the skin under a load."""
+    """Decide whether the scene includes friction: a loaded surface moves over the skin."""
     found = _slides(scene, sensor)
     if not found.called_for or scene.slide is None:
         return found
@@ -238,7 +238,7 @@ def friction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a slide over a rough surface makes the skin vibrate."""
+    """Decide whether the scene includes a vibration of the skin under a sliding rough surface."""
     found = _slides(scene, sensor)
     if not found.called_for or scene.slide is None:
         return found
@@ -248,7 +248,7 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a channel of dynamic fluid pressure is observed."""
+    """Decide whether the scene includes dynamic fluid pressure: a channel of this kind is observed."""
     if "ac_pressure" not in scene.observe:
         return _no("no channel of dynamic pressure is observed")
     if not isinstance(sensor.skin, FluidBackedShell):
@@ -263,12 +263,12 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a channel of a thermistor that the spec describes is observed."""
+    """Decide whether the scene includes steady temperature: a thermistor in the spec gives an observed channel."""
     return _thermistor(scene, sensor, "dc_temperature", THERMISTOR)
 
 
 def ac_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether a channel of the rate of such a thermistor is observed."""
+    """Decide whether the scene includes changing temperature: a thermistor in the spec gives an observed channel."""
     return _thermistor(scene, sensor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
 
 
@@ -283,7 +283,7 @@ def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tup
 
 
 def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether heat flows through the contact: the scene states a temperature of its indenter."""
+    """Decide whether the scene includes heat flow through the contact: it states a temperature of the indenter."""
     missing = [name for name in (*NEEDED, "contact_conductivity") if name not in sensor.parameters]
     if missing:
         return _no(f"the spec states no {', '.join(missing)}")
@@ -296,7 +296,7 @@ def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def thermal_drift(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Return whether resistive channels follow a core that the contact warms or cools."""
+    """Decide whether the scene includes the change of resistive channels by a core that the contact warms or cools."""
     coefficient = sensor.parameters.get("conductivity_coefficient")
     if "taxel" not in scene.observe:
         return _no(NOT_OBSERVED)

@@ -1,4 +1,4 @@
-"""Effects between what is read and the stored number: gain, levels, drift, noise, converter, force sensor."""
+"""Effects applied to the readings before they are stored: gain, levels, drift, noise, converter, force sensor."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from tactbench.rigs.twin.effects.memory import lag, recurrence, time_constant_s,
 from tactbench.rigs.twin.synthesis import Synthesis, Track
 
 _INDEPENDENT = 1e-9
-"""Singular values below this share of the largest one are rounding: those columns repeat others."""
+"""Share of the largest singular value below which a singular value is rounding error: its column depends on others."""
 
 
 def _stated(run: Synthesis) -> Iterator[tuple[Track, ChannelKind, list[int], Nuisances]]:
-    """Yield every track's kinds of channels whose nuisances the spec states, with their columns."""
+    """Yield each track and channel kind for which the spec states nuisances, with the kind's columns and nuisances."""
     for track in run.tracks:
         for kind, columns in track.by_kind().items():
             nuisances = run.nuisances(kind)
@@ -26,9 +26,9 @@ def _stated(run: Synthesis) -> Iterator[tuple[Track, ChannelKind, list[int], Nui
 
 
 def gain(run: Synthesis) -> None:
-    """Draw one factor per channel, the same in every recording of a unit, and one that a unit's channels share.
+    """Draw one gain factor per channel, the same in every recording of a unit, and one for all channels of a unit.
 
-    The first unit's shared factor is 1: its gain is the one that the spec describes. A factor is never below zero.
+    The first unit's common factor is 1: its gain is the one in the spec. A factor is never below zero.
     """
     for track in run.tracks:
         track.gain = np.ones(len(track.channels))
@@ -44,7 +44,7 @@ def gain(run: Synthesis) -> None:
 
 
 def rest_spread(run: Synthesis) -> None:
-    """Move each taxel's rest level by the sensor parameter ``rest_spread`` (sd), the same in every recording."""
+    """Move each taxel's rest level by a random number, the same in every recording; sd: parameter ``rest_spread``."""
     stated = run.sensor.spec.parameters.get("rest_spread")
     if stated is None:
         return
@@ -56,7 +56,7 @@ def rest_spread(run: Synthesis) -> None:
 
 
 def unit_rest(run: Synthesis) -> None:
-    """Move the rest levels by what the channels of a unit share and by what is each one's own; the first unit stays."""
+    """Move rest levels by a random number per unit and one per channel; the first unit keeps the spec's levels."""
     if run.scene.first_unit:
         return
     for track, kind, columns, nuisances in _stated(run):
@@ -76,7 +76,7 @@ def unit_rest(run: Synthesis) -> None:
 
 
 def offset(run: Synthesis) -> None:
-    """Add what all channels of a recording share, what is each one's own, and what a new session changes."""
+    """Add random offsets: one common to all channels of a recording, one of each channel, and those of a session."""
     environment = run.scene.environment
     for track, kind, columns, nuisances in _stated(run):
         shared = nuisances.offset_shared.value * float(run.of_recording("offset", "shared", kind).standard_normal())
@@ -88,11 +88,11 @@ def offset(run: Synthesis) -> None:
 
 
 def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nuisances) -> FloatArray:
-    """Return (recorded channels,) the own offsets, their mean square over channels and recordings 1.
+    """Return the (recorded channels,) offsets of single channels, of mean square 1 over channels and recordings.
 
-    Where the spec states a smooth share ``f`` of a field over ``n`` places: ``sqrt(1 - f) e + sqrt(f n / r) P g`` with
-    white ``e`` and ``g`` and the projection P on the r-dimensional space of quadratics of mean 0 over the places, whose
-    ``P g`` has the mean square r / n. No quadratic is preferred, whatever axes the places are written in.
+    If the spec states a share ``f`` that varies smoothly over the ``n`` places: ``sqrt(1 - f) e + sqrt(f n / r) P g``,
+    with white ``e`` and ``g`` and the projection P on the r-dimensional space of quadratics of mean 0 over the places;
+    ``P g`` has the mean square r / n. The result does not depend on the axes in which the places are given.
     """
     white = run.of_every_channel(track, kind, run.of_recording("offset", "own", kind))
     share = 0.0 if nuisances.offset_smooth is None else nuisances.offset_smooth.to("1")
@@ -108,7 +108,7 @@ def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nui
 
 
 def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
-    """Return (n, r) orthonormal columns: the quadratics over the n channels' places less their means, r at most 5.
+    """Return (n, r) orthonormal columns that span the quadratics of mean 0 over the n channels' places; r is at most 5.
 
     Places are (x, angle about x) on a sheet with a radius, else (x, y). None if a channel has no place.
     """
@@ -126,13 +126,13 @@ def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
 
 
 def _scaled(values: FloatArray) -> FloatArray:
-    """Return values about 0 and within 1, so that squares of metres do not drown; all 0 where they are all alike."""
+    """Return values shifted and scaled to within -1 to 1, so that squares of metres are not lost; 0 if all equal."""
     about = values - (values.max() + values.min()) / 2
     return np.asarray(about / (np.abs(about).max() or 1.0))
 
 
 def warm_up(run: Synthesis) -> None:
-    """Add ``-W f_i exp(-t / tau)``: the spec's rest is the warm level, less what is still to come.
+    """Add ``-W f_i exp(-t / tau)`` to the spec's rest levels, which are those of the warm sensor.
 
     ``t`` counts from power-on; the factors ``f_i = 1 + scatter n_i`` belong to the unit.
     """
@@ -148,7 +148,7 @@ def warm_up(run: Synthesis) -> None:
 
 
 def wander(run: Synthesis) -> None:
-    """Add one independent Ornstein-Uhlenbeck path per channel."""
+    """Add a slow random drift: one independent Ornstein-Uhlenbeck path per channel."""
     scale = run.scene.environment.drift_scale
     for track, kind, columns, nuisances in _stated(run):
         if nuisances.wander.value:
@@ -169,7 +169,7 @@ def white_noise(run: Synthesis) -> None:
 
 
 def hum(run: Synthesis) -> None:
-    """Add the sensor's ``hum`` (rms, counts) between ``hum_low`` and ``hum_high`` to its dynamic pressure."""
+    """Add noise of the rms ``hum`` (counts) between ``hum_low`` and ``hum_high`` to channels of dynamic pressure."""
     stated = run.sensor.spec.parameters
     if "hum" not in stated:
         return
@@ -187,13 +187,13 @@ def band_noise(
     """Return (n,) Gaussian noise within a band, stationary from the first sample on, exact for any step.
 
     White noise through a first-order high-pass and a first-order low-pass, scaled to the standard deviation `spread`.
-    Its density is ``f^2/((f^2 + l^2)(f^2 + h^2))`` up to a factor, with the corners ``l h = low high`` and
-    ``l + h = high - low``: so that half of the peak is left at `low_hz` and at `high_hz`.
+    The spectral density is ``f^2/((f^2 + l^2)(f^2 + h^2))`` up to a factor, with the corners ``l h = low high`` and
+    ``l + h = high - low``, so that it falls to half of its peak at `low_hz` and at `high_hz`.
 
     Raises
     ------
     RigError
-        If the band is narrower than ``high/low = 3 + 2 sqrt(2)``: first-order filters have none narrower.
+        If ``high/low`` is below ``3 + 2 sqrt(2)``: first-order filters cannot have a narrower band.
 
     Notes
     -----
@@ -204,8 +204,8 @@ def band_noise(
     apart = (high_hz - low_hz) ** 2 - 4.0 * low_hz * high_hz
     if not (0 < low_hz < high_hz and apart > 0):
         raise RigError(
-            f"A hum between {low_hz:g} and {high_hz:g} Hz cannot be made.",
-            hint="hum_high must be at least 5.9 times hum_low, and both above 0.",
+            f"A hum between {low_hz:g} and {high_hz:g} Hz cannot be simulated: the band is too narrow or not positive.",
+            hint="Make hum_high at least 5.9 times hum_low, and both above 0.",
         )
     rates = math.pi * np.array([high_hz - low_hz - math.sqrt(apart), high_hz - low_hz + math.sqrt(apart)])
     weights = np.array([-rates[0], rates[1]]) / (rates[1] - rates[0])
@@ -228,7 +228,7 @@ def band_noise(
 def converter(run: Synthesis) -> None:
     """Round readings to the converter's step and clip them to each channel's range; the last stage.
 
-    A sample is flagged SATURATED when the converter stands at its end, as the reader of a real one would see it.
+    A sample at either end of the converter's range is flagged SATURATED, as for a real sensor.
     """
     for track in run.tracks:
         for column, channel in enumerate(track.channels):
@@ -246,7 +246,7 @@ def converter(run: Synthesis) -> None:
 def force_noise(run: Synthesis) -> None:
     """Add white noise to the reference force, unfiltered as in the paper; the load itself stays the true one.
 
-    Tangential components come from the same sensor and get the same noise, each its own numbers.
+    Tangential components come from the same sensor and get noise of the same size, drawn independently.
     """
     spread = run.scene.environment.force_noise.to("N")
     run.reference_n += spread * run.of_recording("force").standard_normal(run.t_s.size)
@@ -259,7 +259,7 @@ def force_noise(run: Synthesis) -> None:
 def force_filter(run: Synthesis) -> None:
     """Filter the reference force, noise included, by a first-order low-pass at the scene's ``force_filter``.
 
-    Exact for a force that is straight between samples, whatever the steps. It begins settled on the first sample.
+    The filter is exact for a force linear between samples, for any steps, and starts in equilibrium.
     Tangential components pass the same filter.
     """
     cutoff = run.scene.environment.force_filter

@@ -1,4 +1,4 @@
-"""Creep: part of a channel's response follows the load with a delay."""
+"""Creep of the skin: a part of each channel's response follows the load with a delay."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis
 def apply(run: Synthesis) -> None:
     """Replace the force that each kind of channel follows by ``F (1 - sum c_i) + sum c_i lag_i(F)``.
 
-    Linear viscoelasticity acts on the force before the load table is evaluated: hysteresis follows from its history.
-    It is left out, and the plan is updated, where it changes no reading by more than a third of noise and rounding
+    Linear viscoelasticity acts on the force before the load table is evaluated, which gives hysteresis. Creep
+    is left out, and the plan is updated, where it changes no reading by more than a third of noise and rounding
     (:func:`bounds`), unless the scene includes it by name, has a motor's force loop, or heats or cools the core.
     """
     stated = {kind: run.nuisances(kind) for track in run.tracks for kind in track.by_kind()}
@@ -34,19 +34,19 @@ def apply(run: Synthesis) -> None:
 
 
 def steepest_n_per_s(load: Load) -> float:
-    """Return the largest rate at which a load changes; infinity for a step."""
+    """Return the largest rate of change [N/s] of a load; infinity for a step."""
     rises, steps = np.abs(np.diff(load.force_n)), np.diff(load.t_s)
     with np.errstate(divide="ignore"):
         return float(np.max(rises[rises > 0] / steps[rises > 0], initial=0.0))
 
 
 def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances], rate_n_per_s: float) -> dict[ChannelKind, float]:
-    """Return, by kind of channel, a bound on the change by leaving creep out [count].
+    """Return, by kind of channel, an upper bound [count] of the error of readings if creep is left out.
 
-    Behind a load that changes at most at a rate ``r`` a lag of time constant ``tau`` stays back by at most ``tau r``.
-    So the force is off by at most ``r sum(c_i tau_i)``, and a reading by that times its largest slope: that of the
-    load table this recording is made from, over the forces that occur, times the channel's own gain. Nothing is known
-    (infinity) of channels that the table does not hold.
+    If the load changes at most at a rate ``r``, a lag of time constant ``tau`` is behind it by at most ``tau r``. So
+    the force is off by at most ``r sum(c_i tau_i)``, and a reading by this times its largest slope: the largest in the
+    recording's load table, over the forces that occur, times the channel's own gain. For channels that the table does
+    not hold the bound is infinity.
     """
     table, names = skin_under_load(run), read_names(run)
     found = dict.fromkeys(late, 0.0)

@@ -1,4 +1,4 @@
-"""A motor under force control, whose loop turns the commanded force into the true one."""
+"""Simulation of a motor under force control, whose control loop turns the commanded force into the true force."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from tactbench.rigs.twin.synthesis import Load, Synthesis
 BEYOND = 3.0
 """Multiple of the largest commanded force up to which the skin is solved; it limits the motor's travel."""
 RETRACT_MM = 1.0
-"""Travel limit away from the skin [assumed]; it bounds a loop that oscillates."""
+"""Largest travel [mm] of the motor away from the skin [assumed]; it bounds oscillations of the control loop."""
 _CURVE_POINTS = 4001
-"""Depths at which the force is tabulated. Straight between them: against the curve of the solved loads the force is
-off by less than 1e-4 of the largest (test)."""
+"""Number of depths at which the force is tabulated; linear interpolation between them is off by less than 1e-4 of the
+largest force (tested)."""
 
 
 def apply(run: Synthesis) -> None:
-    """Simulate the force loop over the recording and make its force the load.
+    """Simulate the motor's force control over the recording, and use the resulting force as the load.
 
-    Without a rate of its own the loop reads the force once per recorded sample, and its sensor errs by the very
-    numbers that are recorded: it is one sensor.
+    Unless its rate is stated, the loop reads the force once per recorded sample, with the same noise as the recorded
+    force: both come from one sensor.
     """
     drive = run.scene.drive
     if drive is None or not run.load.largest_n > 0:
@@ -50,9 +50,9 @@ def apply(run: Synthesis) -> None:
 
 
 def force_at_depth(table: LoadTable) -> tuple[Callable[[float], float], float]:
-    """Return the force at a depth, and the depth at which the table ends: deeper it is held.
+    """Return the force as a function of depth, and the depth at which it ends: beyond, the force is constant.
 
-    Depth rises with load, so its curve can be read the other way round; a depth of 0 or less has no force.
+    Depth rises with load, so that the curve of the load table can be inverted; at depths up to 0 the force is 0.
     """
     loads = np.linspace(0.0, float(table.loads_n[-1]), 20 * _CURVE_POINTS)
     # Ties and dips by rounding would leave a depth without its force.

@@ -1,4 +1,4 @@
-"""Friction between a sliding surface and the skin."""
+"""Effect of friction between a sliding surface and the skin."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ MODE: dict[str, Quantity] = {
     ),
     "skin_mode_damping": assumed(0.1, "1", "share of the critical damping; no source for any of these skins"),
 }
-"""Default mode of the skin for sensors whose parameters state none."""
+"""Parameters of the skin's tangential oscillation, for sensors whose parameters state none."""
 
 
 def mode_of(sensor: SensorSpec) -> Mode:
-    """Return the tangential mode of the skin under a contact."""
+    """Return the tangential oscillation (frequency and damping) of a sensor's skin under a contact."""
     found = {**MODE, **sensor.parameters}
     return Mode(2.0 * math.pi * found["skin_mode_frequency"].to("Hz"), found["skin_mode_damping"].to("1"))
 
 
 def apply(run: Synthesis) -> None:
-    """Drag the skin, and record the tangential force and the true slip with the reference force.
+    """Compute the motion of a dragged skin, and record tangential force and true slip beside the reference force.
 
     The force sensor's stream gains ``fx`` and ``fy`` (force on the sensor, along x and s), ``slip`` (how far the
     surface has slipped over the skin under it, in metres), ``slipping`` (1 while the whole contact slips) and

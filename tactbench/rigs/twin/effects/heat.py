@@ -17,7 +17,7 @@ from tactbench.rigs.twin.synthesis import Synthesis, Track
 
 
 def contact_heat(run: Synthesis) -> None:
-    """Compute how heat flow between core and indenter, through the area of contact, warms the core."""
+    """Compute the temperature change of the core by heat flow between core and indenter through the contact's area."""
     core = HeatedCore.of(run.scene, run.sensor.spec)
     indenter = run.scene.environment.indenter_temperature
     conductivity = run.sensor.spec.parameters.get("contact_conductivity")
@@ -67,10 +67,10 @@ def _thermistor(run: Synthesis, track: Track, column: int) -> FloatArray | None:
 
 
 def thermal_drift(run: Synthesis) -> None:
-    """Scale the resistance behind each reading by the fluid's conductivity without the contact over that with it.
+    """Scale each reading's resistance by the ratio of the fluid's conductivities without and with the contact.
 
-    Only the change by the contact: how readings rise while the core warms up is measured, and the effect "warm-up"
-    holds it.
+    This is the change by the contact only: the measured rise of readings while the core warms up is in the effect
+    "warm-up".
     """
     core = HeatedCore.of(run.scene, run.sensor.spec)
     coefficient = run.sensor.spec.parameters.get("conductivity_coefficient")
@@ -90,7 +90,7 @@ def thermal_drift(run: Synthesis) -> None:
 
 
 def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) -> FloatArray:
-    """Return what a divider reads when its resistance falls by the factor `gained`: ``E = top/(1 + R/R_ref)``.
+    """Return a voltage divider's reading ``E = top/(1 + R/R_ref)`` after its resistance falls by the factor `gained`.
 
     Readings at or beyond the ends (no resistance, or no conductance) stay as they are.
     """

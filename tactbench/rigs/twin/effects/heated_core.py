@@ -1,10 +1,10 @@
-"""A heated core as one lump (a heater, a resistance to the room, another one through the contact) and its thermistor.
+"""Heated core as one thermal mass (with a heater and resistances to room and indenter), and its thermistor.
 
     C dT/dt = P + (T_room - T)/R + G (T_indenter - T)
 
 With `Y = 1/R + G`, `T_inf = (P + T_room/R + G T_indenter)/Y` and `tau = C/Y`, a step of constant G is
-``T' = T_inf + (T - T_inf) exp(-dt/tau)``: exact for any dt, so a step of a thousand tau lands on T_inf and dt = 0
-changes nothing. G varies along a ramp: each step takes the mean of its ends.
+``T' = T_inf + (T - T_inf) exp(-dt/tau)``: exact for any dt, so a step of a thousand tau ends at T_inf and dt = 0
+changes nothing. G varies along a ramp: for each step the mean of its values at both ends is used.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from tactbench.plugin import FloatArray, Scene, SensorSpec
 from tactbench.rigs.twin.effects.memory import recurrence
 
 NEEDED = ("heater_power", "heat_resistance", "heat_capacity")
-"""Parameters of a sensor with a heated core."""
+"""Names of the parameters that a sensor with a heated core must state."""
 THERMISTOR = ("thermistor_b", "thermistor_p", "thermistor_q")
-"""Parameters of a sensor with a thermistor."""
+"""Names of the parameters that a sensor with a thermistor must state."""
 _ICE_K = 273.15
 
 
@@ -34,7 +34,7 @@ class HeatedCore:
 
     @classmethod
     def of(cls, scene: Scene, sensor: SensorSpec) -> HeatedCore | None:
-        """Return the core that the spec declares, in the scene's room; None without one."""
+        """Return the heated core of the sensor's spec at the scene's room temperature; None for a spec without one."""
         if any(name not in sensor.parameters for name in NEEDED):
             return None
         return cls(
@@ -46,18 +46,18 @@ class HeatedCore:
 
     @property
     def rise_k(self) -> float:
-        """Temperature of the warm core above that of the room, K."""
+        """Final temperature of the heated core above the room's temperature, K."""
         return self.power_w * self.resistance_k_per_w
 
     @property
     def tau_s(self) -> float:
-        """Time constant without a contact."""
+        """Time constant of the core's temperature without a contact, s."""
         return self.capacity_j_per_k * self.resistance_k_per_w
 
     def untouched(self, scene: Scene, t_s: FloatArray) -> FloatArray:
-        """Return the (n,) temperature without a contact, degC, at (n,) seconds since the recording's first sample.
+        """Return the core's temperature without a contact, degC, at (n,) seconds since the recording's first sample.
 
-        At power-on it is the room's. The scene's ``drift_scale`` scales what is still to come, as it does warm-up.
+        At power-on it is the room's. The scene's ``drift_scale`` scales the remaining rise, as in the effect "warm-up".
         """
         environment = scene.environment
         since = environment.since_power_on.to("s") + scene.starts_after_s + t_s
@@ -75,7 +75,7 @@ class HeatedCore:
     def carried(
         self, t_s: FloatArray, conductance_w_per_k: FloatArray, indenter_c: float, start_c: float
     ) -> FloatArray:
-        """Return the (n,) temperature, degC, that starts at `start_c`."""
+        """Return the (n,) temperatures of the core under the given contact, degC, from `start_c` on."""
         before = np.concatenate([conductance_w_per_k[:1], conductance_w_per_k[:-1]])
         through = 0.5 * (before + conductance_w_per_k)
         loss = 1.0 / self.resistance_k_per_w + through
@@ -88,7 +88,7 @@ class HeatedCore:
 
 
 def disc_conductance_w_per_k(radius_mm: FloatArray, conductivity_w_per_m_k: float) -> FloatArray:
-    """Return ``4 k a``: the flow per kelvin from an isothermal disc of radius a into a half-space.
+    """Return ``4 k a``, the thermal conductance from an isothermal disc of radius a into a half-space.
 
     Carslaw and Jaeger 1959, Conduction of heat in solids, chapter 8; without a contact it is 0.
     """
@@ -98,17 +98,17 @@ def disc_conductance_w_per_k(radius_mm: FloatArray, conductivity_w_per_m_k: floa
 def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatArray:
     """Return the conductivity of an electrolyte relative to that at 25 degC: ``1 + alpha (T - 25)``.
 
-    Raised to a tenth where the straight line would leave the range of liquids (below -20 degC for 2 % per kelvin).
+    The result is at least 0.1, where the formula would leave the range of liquids (below -20 degC for 2 % per kelvin).
     """
     return np.asarray(np.maximum(1.0 + coefficient_per_k * (degc - 25.0), 0.1))
 
 
 @dataclass(frozen=True)
 class Thermistor:
-    """``T = b / ln((p - q x)/x) - 273.15`` degC, with x the reading over full scale.
+    """A thermistor with ``T = b / ln((p - q x)/x) - 273.15`` degC, x being the reading over full scale.
 
-    The form in which the maker of the BioTac states it (SynTouch BioTac SP product manual, section 5): a thermistor
-    of exponent b in a divider.
+    The formula is that of the BioTac's maker (SynTouch BioTac SP product manual, section 5) for a thermistor of
+    exponent b in a voltage divider.
     """
 
     b_k: float
@@ -118,14 +118,14 @@ class Thermistor:
 
     @classmethod
     def of(cls, sensor: SensorSpec, full_scale: float) -> Thermistor | None:
-        """Return the thermistor that the spec declares; None without one."""
+        """Return the thermistor of a sensor's spec; None for a spec without one."""
         if any(name not in sensor.parameters for name in THERMISTOR):
             return None
         b, p, q = (sensor.parameters[name] for name in THERMISTOR)
         return cls(b.to("K"), p.to("1"), q.to("1"), full_scale)
 
     def reading(self, degc: FloatArray) -> FloatArray:
-        """Return the readings at temperatures: ``x = p / (exp(b/T) + q)``, T in kelvin."""
+        """Return the readings [count] at temperatures [degC]: full scale times ``p / (exp(b/T) + q)``, T in kelvin."""
         # Above absolute zero by a kelvin: colder than that, the exponential overflows.
         kelvin = np.maximum(np.asarray(degc, dtype=np.float64) + _ICE_K, 10.0)
         return np.asarray(self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q))

@@ -1,7 +1,7 @@
 """Linear filters with memory, exact for any step and unconditionally stable.
 
-All follow ``x' = a x + b`` with ``a = exp(-dt / tau)``. Unequal steps use each its own dt; a repeated time stamp has
-dt = 0 and changes nothing. Times must ascend.
+All filters compute ``x' = a x + b`` with ``a = exp(-dt / tau)``, dt being that of each step: steps may differ, and a
+repeated time stamp (dt = 0) changes nothing. Times must ascend.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def steps_s(t_s: FloatArray, tau_s: float) -> FloatArray:
     """
     if not (tau_s > 0 and np.isfinite(tau_s)):
         raise RigError(
-            f"A filter has the time constant {tau_s:g} s; it must be positive and finite.",
+            f"A filter has the time constant {tau_s:g} s; a positive, finite number is expected.",
             hint="Correct the time constants among the sensor's nuisances.",
         )
     return np.diff(t_s, prepend=t_s[:1])
@@ -38,9 +38,9 @@ Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
     """Return ``x_n = decay_n x_{n-1} + drive_n`` for all n, with ``x_0 = drive_0``.
 
-    `decay` (n,) is of absolute value 0 to 1, its first entry is not used; `drive` is (n,) or (n, channels). Solved by
-    doubling: after step j every entry holds the sum over its last 2^j predecessors, so that 5000 samples take 13 vector
-    operations. Products of factors up to one cannot overflow.
+    `decay` (n,) is of absolute value 0 to 1, its first entry is not used; `drive` is (n,) or (n, channels). The method
+    is doubling: after step j every entry holds the sum over its last 2^j predecessors, so that 5000 samples take 13
+    vector operations. Products of factors up to 1 cannot overflow.
     """
     x = drive.copy()
     factor = decay.reshape(-1, *([1] * (drive.ndim - 1))).copy()
@@ -53,11 +53,11 @@ def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
 
 
 def lag(t_s: FloatArray, load: FloatArray, tau_s: float) -> FloatArray:
-    """Return the first-order lag of a (n,) load that is straight between samples, starting in equilibrium.
+    """Return the (n,) first-order lag of a (n,) load that is linear between samples, starting in equilibrium.
 
-    Times ascend; equal neighbours are allowed. Raises as :func:`steps_s`.
+    Times ascend; equal neighbours are allowed. Raises the errors of :func:`steps_s`.
 
-    ``z' = a z + (1-a) x_n + (x_{n+1} - x_n) (1 - (tau/dt) (1-a))``, the exact answer to a straight input.
+    ``z' = a z + (1-a) x_n + (x_{n+1} - x_n) (1 - (tau/dt) (1-a))``, the exact response to a linear input.
     """
     e = steps_s(t_s, tau_s) / tau_s
     late = -np.expm1(-e)
@@ -77,7 +77,7 @@ def wandering(
 ) -> FloatArray:
     """Return (n, channels) independent Ornstein-Uhlenbeck paths, stationary from the first sample on.
 
-    Mean 0, standard deviation `spread`, correlation ``exp(-|t| / tau)``. Raises as :func:`steps_s`.
+    Mean 0, standard deviation `spread`, correlation ``exp(-|t| / tau)``. Raises the errors of :func:`steps_s`.
     """
     dt = steps_s(t_s, tau_s)
     fresh = np.sqrt(-np.expm1(-2 * dt / tau_s))
@@ -88,5 +88,5 @@ def wandering(
 
 
 def time_constant_s(cutoff_hz: float) -> float:
-    """Return the time constant of a first-order filter: ``1 / (2 pi f)``."""
+    """Return the time constant [s] of a first-order filter with the cut-off frequency f: ``1 / (2 pi f)``."""
     return 1.0 / (2.0 * math.pi * cutoff_hz)

@@ -1,8 +1,8 @@
-"""The tangential mode of the skin: its motion in a slip, and its response to a given motion.
+"""Tangential oscillation of the skin under a contact: motion in a slip, and response to a given motion.
 
 In a slip the skin under the contact is a damped oscillator ``x'' + 2 z w x' + w^2 (x - x_e) = 0`` about ``x_e``, the
-deflection that kinetic friction holds. It lets go at ``x_e + u`` with the surface's speed V and is caught when it has
-that speed again. Without damping (two-coefficient friction, Rabinowicz 1965) it is caught at ``x_e - u``, after
+deflection that kinetic friction holds. A slip begins at ``x_e + u`` with the surface's speed V and ends when the skin
+has this speed again. Without damping (two-coefficient friction, Rabinowicz 1965) it ends at ``x_e - u``, after
 ``(2/w)(pi - atan(w u/V))``, for any V: the force falls by ``2 (mu_s - mu_k) N``.
 """
 
@@ -30,7 +30,7 @@ class Mode:
     def __post_init__(self) -> None:
         if not (self.omega > 0 and 0 <= self.damping < 1):
             raise RigError(
-                f"A skin mode of {self.omega:g} rad/s with {self.damping:g} of the critical damping cannot swing.",
+                f"The skin cannot oscillate at {self.omega:g} rad/s with {self.damping:g} of the critical damping.",
                 hint="State skin_mode_frequency above 0 and skin_mode_damping from 0 to below 1 in the sensor's spec.",
             )
 
@@ -46,7 +46,7 @@ class Mode:
 
 
 def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) letting go at `u` with `speed`."""
+    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) after a slip began at `u`, `speed`."""
     w, r = mode.swing, mode.decay
     c, s = np.cos(w * after_s), np.sin(w * after_s)
     faded = np.exp(-r * after_s)
@@ -57,13 +57,13 @@ def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> 
 
 
 def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
-    """Return the deflection of :func:`swing` at one moment, without arrays: it is evaluated once per slip."""
+    """Return the deflection of :func:`swing` at one moment, without arrays because it is computed once per slip."""
     w, r = mode.swing, mode.decay
     return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
 
 
 def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
-    """Return (n,) whether a slip that begins at `u` (n,) ever reaches the surface's speed again."""
+    """Return (n,) True where the skin, in a slip that begins at `u` (n,), reaches the surface's speed again."""
     w, r = mode.swing, mode.decay
     back = (mode.omega**2 * u + r * speed) / w
     highest = np.arctan2(r * speed + back * w, r * back - speed * w) + math.pi
@@ -74,8 +74,8 @@ def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
 def slip_s(mode: Mode, u: float, speed: float) -> float:
     """Return the duration of the slip in seconds; infinity if the skin never sticks again.
 
-    The velocity rises throughout the half turn after its minimum: one root there, found by Newton steps inside a
-    shrinking bracket to the last digits.
+    The velocity rises throughout the half period after its minimum, so that it reaches the surface's speed once there:
+    the time is found by Newton steps inside a shrinking bracket, to the last digits.
     """
     w, r = mode.swing, mode.decay
     back = (mode.omega**2 * u + r * speed) / w
@@ -108,11 +108,11 @@ def slip_s(mode: Mode, u: float, speed: float) -> float:
 
 
 def shaken(t_s: FloatArray, pushed: FloatArray, mode: Mode) -> FloatArray:
-    """Return (n,) the answer of ``q'' + 2 z w q' + w^2 q = w^2 u``, at rest in equilibrium at the first sample.
+    """Return the (n,) solution q of ``q'' + 2 z w q' + w^2 q = w^2 u``, at rest in equilibrium at the first sample.
 
     `t_s` (n,) ascends; equal neighbours change nothing. u is `pushed` (n,), the displacement under a slow push,
-    straight between samples. With ``l = -z w + i wd`` and ``p = q' - conj(l) q`` it is one complex lag, ``p' = l p +
-    w^2 u``, and ``q = Im p / wd``: exact like the lag of ``memory``, and solved as quickly.
+    linear between samples. With ``l = -z w + i wd`` and ``p = q' - conj(l) q`` the equation is one complex lag, ``p' =
+    l p + w^2 u``, and ``q = Im p / wd``: exact like the lag of ``memory``, and solved as quickly.
     """
     root = complex(-mode.decay, mode.swing)
     dt = np.diff(t_s, prepend=t_s[:1])

@@ -14,22 +14,22 @@ from tactbench.rigs.twin.synthesis import Synthesis
 LIFT: Quantity = assumed(
     0.03, "1", "a patch of a round finger that moves by x along it moves by x^2/(2 Ro) into it: x/Ro at 0.25 mm"
 )
-"""Normal over tangential motion of the skin, for sensors whose parameters state no ``skin_lift``."""
+"""Ratio of normal to tangential motion of the skin, for sensors whose parameters state no ``skin_lift``."""
 COMPONENTS = 48
-"""Number of cosines of the profile: enough to be close to Gaussian; it determines the effect's cost."""
+"""Number of cosines of a rough profile: enough for a nearly Gaussian one; it determines the computing time."""
 LONGEST_MM, SHORTEST_MM = 100.0, 0.02
-"""Wavelengths of the cosines. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band."""
+"""Limits of the cosines' wavelengths (assumed): at 20 mm/s longer ones take over 5 s, shorter ones exceed the band."""
 _RADII = 1025
-"""Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
+"""Number of contact radii for which means are computed; linear interpolation between them is right to 1e-4."""
 
 
 def apply(run: Synthesis) -> None:
-    """Compute the vibration of the skin on every clock that reads it, caused by the rough profile and by stick-slip.
+    """Compute the vibration of the skin, caused by a rough profile and by stick-slip, for every clock that reads it.
 
-    The indenter is held where it stood when the slip began, so that the profile passing under the contact moves the
-    skin, through its mode, and with it the normal force that is measured. The tangential motion of stick-slip (which
-    has swung in that mode already) lifts the skin in proportion: only dynamic pressure shows it, because the
-    proportion is known for a motion and not for a place.
+    The indenter is held at its height at the beginning of the slip, so that the passing profile moves the skin (through
+    its resonance) and changes the measured normal force. The tangential motion of stick-slip (computed with the same
+    resonance) lifts the skin in proportion: only dynamic pressure includes it, because the proportion is known for a
+    motion and not for a place.
     """
     slide = run.scene.slide
     if slide is None or run.sliding is None:
@@ -60,11 +60,11 @@ def apply(run: Synthesis) -> None:
 
 
 class Profile:
-    """A random self-affine profile: a deterministic function of the place.
+    """A random self-affine height profile of a surface, drawn once: afterwards a fixed function of the place.
 
     Its spectrum over the wave number k is even up to the roll-off and falls as ``k^-(1 + 2 H)`` beyond (Persson et al.
-    2005, J. Phys.: Condens. Matter 17 R1). Of each of equal steps in ln k one cosine, anywhere within it, has the
-    step's share of the variance; wavelengths and phases are drawn from `generator`, uniformly.
+    2005, J. Phys.: Condens. Matter 17 R1). Each of equal steps in ln k gives one cosine with the step's share of the
+    variance; its place within the step and its phase are drawn uniformly from `generator`.
     """
 
     def __init__(self, surface: Surface, generator: np.random.Generator) -> None:
@@ -78,7 +78,7 @@ class Profile:
         self._amplitude_mm = surface.roughness.to("mm") * np.sqrt(2.0 * shares)
 
     def felt_mm(self, place_mm: FloatArray, contact_radius_mm: FloatArray) -> FloatArray:
-        """Return (n,) the profile's mean over a contact of (n,) radii around (n,) places."""
+        """Return the (n,) means of the profile [mm] over contacts of (n,) radii around (n,) places."""
         height = np.zeros(place_mm.size)
         radii = np.linspace(0.0, float(contact_radius_mm.max(initial=0.0)), _RADII)
         for wave, phase, amplitude in zip(self._wave_per_mm, self._phase, self._amplitude_mm, strict=True):
@@ -88,10 +88,10 @@ class Profile:
 
 
 def patch_mean(turn: FloatArray) -> FloatArray:
-    """Return the mean of a unit cosine over a contact, relative to its middle.
+    """Return the mean of a cosine over a round contact, relative to the cosine's value at the contact's centre.
 
-    Weighted with the Hertzian pressure ``sqrt(1 - r^2/a^2)``: ``3 (sin k - k cos k)/k^3`` with
-    ``k = 2 pi a/wavelength`` (the transform of a ball, which that weight is the shadow of).
+    The weight is the Hertzian pressure ``sqrt(1 - r^2/a^2)``, which gives ``3 (sin k - k cos k)/k^3`` with
+    ``k = 2 pi a/wavelength``, the Fourier transform of a ball.
     """
     small = np.abs(turn) < 0.05
     safe = np.where(small, 1.0, turn)

@@ -1,15 +1,15 @@
 """Stick-slip of a dragged skin: sticking, slipping and steady sliding, each phase in closed form.
 
-The surface moves at a constant speed; load, contact radius and stiffness change slowly and are straight between the
+The surface moves at a constant speed; load, contact radius and stiffness change slowly and are linear between the
 nodes of a grid. There are no time steps: the end of a phase is computed in closed form.
 
 - **stick**: the skin moves with the surface, until elastic and viscous force reach ``mu_s N``. The force follows
   Cattaneo and Mindlin.
-- **slip**: see :mod:`skin_mode`; kinetic friction is that at the slip's mean speed, held at its beginning.
-- **slide**: if the skin is not caught; the force follows the LuGre bristle. It ends where sliding is no longer
-  stable (friction weakens faster than the skin is damped) and a slip would be caught.
-- **held**: after the motion, the skin stays, and slides back as far as a falling load no longer holds it. Its partial
-  slip is that of the force ratio, counted as while it stuck; after a slip all of it sticks until the load falls.
+- **slip**: see :mod:`skin_mode`; the kinetic friction is that at the slip's mean speed, fixed when the slip begins.
+- **slide**: if the skin never sticks again; the force follows the LuGre bristle. The phase ends where sliding is no
+  longer stable (friction weakens with speed faster than the skin is damped) and a slip would end in sticking.
+- **held**: after the motion the skin stays, and slides back as far as a falling load cannot hold it. Its partial slip
+  follows from the force ratio as in sticking; after a slip the whole contact sticks until the load falls.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from tactbench.rigs.twin.synthesis import Tangential
 
 REST, STICK, SLIP, SLIDE, HELD = range(5)
 _LEAST_LOAD_N = 1e-4
-"""Smallest load with stick-slip; under less the skin slides."""
+"""Smallest load [N] with stick-slip; under smaller loads the skin slides steadily."""
 _RUNG_OUT = math.log(1e3)
-"""Decay after which the oscillation of a slip without end counts as over: a thousandth."""
+"""Exponent of decay, to a thousandth, after which the oscillation of a slip without sticking counts as ended."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class Drive:
     stribeck_mm_s: float
     mode: Mode
     t_s: FloatArray
-    """(m,) grid, ascending, over the whole recording."""
+    """(m,) ascending times of the grid's nodes, over the whole recording."""
     load_n: FloatArray
-    """(m,) normal force."""
+    """(m,) normal force at the grid's nodes."""
     stiffness: FloatArray
-    """(m,) tangential stiffness of the skin, N/mm; above 0 where there is a load."""
+    """(m,) tangential stiffness of the skin, N/mm; above 0 wherever the load is."""
 
 
 class Dragged:
-    """The state of the skin that a `drive` drags, at any moment."""
+    """Motion of the skin under a dragged surface (`drive`): gives the tangential state at any moment."""
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
@@ -71,7 +71,7 @@ class Dragged:
         self._breaks = (
             contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
         )
-        """(m,) whether sliding is unstable and stick-slip occurs."""
+        """(m,) True where sliding is unstable, so that stick-slip occurs."""
         self._way_mm = drive.speed_mm_s * drive.t_s
         self._x_t: list[FloatArray] = []
         self._x_mm: list[FloatArray] = []
@@ -95,7 +95,7 @@ class Dragged:
         return np.asarray(self._begin[self._kind == STICK])
 
     def _within_slip(self, per_n: FloatArray) -> FloatArray:
-        """Return the (m,) friction coefficient within a slip: that at its mean speed without damping."""
+        """Return the (m,) friction coefficients during a slip: those at the mean speed of an undamped slip."""
         drive = self.drive
         if drive.stribeck_mm_s < COULOMB_MM_S:
             return np.full(drive.t_s.size, drive.kinetic)
@@ -105,7 +105,7 @@ class Dragged:
         return np.asarray(drive.kinetic + (drive.static - drive.kinetic) * weaker)
 
     def _unstable(self) -> npt.NDArray[np.bool_]:
-        """Return (m,) whether friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
+        """Return (m,) True where friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
         drive = self.drive
         if drive.stribeck_mm_s < COULOMB_MM_S:
             return np.zeros(drive.t_s.size, dtype=bool)
@@ -147,7 +147,7 @@ class Dragged:
             self._hold(max(t, drive.start_s), x, since)
 
     def _lets_go(self, t: float, x: float, end: float) -> tuple[float, float]:
-        """Return time and deflection at which the skin that sticks since t at x begins to slip, at most `end`."""
+        """Return time (at most `end`) and deflection at which the skin, sticking since time t at x, begins to slip."""
         drive = self.drive
         lead_mm = drive.speed_mm_s * t - x
         if x >= np.interp(t, drive.t_s, self._static_mm):
@@ -173,7 +173,7 @@ class Dragged:
         return cross, x + drive.speed_mm_s * (cross - t)
 
     def _slide(self, t: float, x: float, end: float) -> tuple[float, float]:
-        """Append a phase of sliding from t until it becomes unstable or ends; return its end and the deflection."""
+        """Append a phase of sliding from time t until it is unstable or `end`; return its end time and deflection."""
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
         last = int(np.searchsorted(drive.t_s, end, side="left"))
@@ -200,7 +200,7 @@ class Dragged:
         self._x_mm.append(np.minimum.accumulate(held))
 
     def __call__(self, t_s: FloatArray) -> Tangential:
-        """Return the tangential state at (n,) moments."""
+        """Return the tangential state of the contact at (n,) times."""
         drive = self.drive
         phase = np.searchsorted(self._begin, t_s, side="right") - 1
         kind, begin, x0, about = self._kind[phase], self._begin[phase], self._from[phase], self._about[phase]
