@@ -357,7 +357,7 @@ def run(
     if data is not None:
         given = {"sensor": sensor, "task": task, "estimator": estimator, "recordings": recordings}
         if misplaced := [name for name, value in given.items() if value not in ((), None)]:
-            raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
+            raise UsageError(f"`{misplaced[0]}` excludes `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = named(estimator)
     given = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
