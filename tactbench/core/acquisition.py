@@ -145,7 +145,7 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):
             raise RigError(
-                f"No row came from {', '.join(names)} in the whole scene.",
+                f"No row came from {', '.join(names)} during the whole scene.",
                 hint="Check power, cable and speed of the device; `tactbench doctor` tests its link.",
             )
 

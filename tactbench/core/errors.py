@@ -1,4 +1,4 @@
-"""Errors that tactbench raises on purpose.
+"""Errors that tactbench raises for invalid input, data or plugins.
 
 ::
 

@@ -61,7 +61,7 @@ class Block:
 
 
 COLUMNS = ("t_ns", "data", "quality", "sequence", "device_ns")
-"""Names of the columns of a block."""
+"""Names of the columns of a block of samples."""
 
 
 def join_blocks(blocks: Sequence[Block]) -> Block:

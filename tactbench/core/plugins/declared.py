@@ -34,7 +34,7 @@ def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
             known, where = found.setdefault(task.name, (task, path))
             if known != task:
                 raise UsageError(
-                    f"The task {task.name!r} is not the same in {where} and in {path}.",
+                    f"The task {task.name!r} is declared differently in {where} and in {path}.",
                     hint="Give one sub-folder with --recordings, or rename one of the two tasks.",
                 )
     return tuple(task for task, _ in found.values())

@@ -49,7 +49,7 @@ class Acquisition(Protocol):
 
 
 class SimulatedPress(Acquisition, Protocol):
-    """A simulated acquisition with a force curve of the skin, for an emulated motor."""
+    """A simulated acquisition that can compute the skin's force curve, for an emulated motor."""
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
         """Return ascending depths of the indenter from first touch, (n,) [m], and the forces at these depths, (n,) [N].

@@ -239,7 +239,7 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 
 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
-    """Return the descriptors of a plugin as plain data."""
+    """Return the descriptors of a plugin as plain data, to be sent between processes."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
     found = {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
     for descriptor, dumped in zip(offered.get("sensors", ()), found.get("sensors", ()), strict=True):
@@ -312,7 +312,7 @@ def _check_api_version(module: str, written_for: object) -> None:
         return
     raise PluginContractError(
         f"{module} states TACTBENCH_API = {written_for!r}, but this tactbench has version {here} of the interface.",
-        hint=f"Write TACTBENCH_API = {here} in it, or update the older of the two: see docs/stability.md.",
+        hint=f"Update the older of plugin and tactbench, and state TACTBENCH_API = {here}: see docs/stability.md.",
     )
 
 

@@ -50,7 +50,7 @@ class DeclaredTask(TaskFields):
         if self.answer is not None and not isinstance(self.target, LabelTarget):
             raise ValueError("answer: give class or number for a label only; a channel is always a number")
         if self.metric is not None and self.metric not in _METRICS[self._answer]:
-            raise ValueError(f"a {self._answer} is scored by {', '.join(_METRICS[self._answer])}, not by {self.metric}")
+            raise ValueError(f"metrics of a {self._answer} are {', '.join(_METRICS[self._answer])}, not {self.metric}")
         try:
             self.spec  # noqa: B018  (a task that is not valid is refused in the file that declares it)
         except ValidationError as error:

@@ -98,7 +98,7 @@ class SlipTarget(Frozen):
     hop_s: Seconds = Field(gt=0)
     """Time between the ends of consecutive frames [s]."""
     window_s: Seconds = Field(gt=0)
-    """Length of a frame [s]."""
+    """Length of a frame, the time window of one answer [s]."""
     thresholds: SlipThresholds = THRESHOLDS
     friction: str = "friction_coefficient"
     """Name of the recordings' label with the static coefficient of friction [1]."""

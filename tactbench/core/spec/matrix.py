@@ -27,7 +27,7 @@ REPLICATES = 8
 """Default number of replicates of a simulated cell; with so many, an outlier hardly moves a 95 % interval."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
-"""One name or a list of names."""
+"""One name, or a list of names, in a matrix file."""
 
 
 class EstimatorChoice(Frozen):
@@ -85,7 +85,7 @@ class MatrixSpec(Frozen):
     rig_file: str | None = None
     """Rig file (:class:`~tactbench.core.spec.rig_file.RigFile`) of devices, relative to the working directory."""
     timeout_s: float | None = Field(default=None, gt=0, le=MOST_SECONDS)
-    """Longest time that a cell or a recording may take [s]."""
+    """Time limit of a cell or of a recording [s]."""
     memory_mb: int | None = Field(default=None, ge=1, le=MOST_MEMORY_MB)
     """Most memory that a cell or a recording may use beyond the memory that all processes share [MB of 2**20 bytes]."""
     probe: bool = False

@@ -78,7 +78,7 @@ Share = Annotated[Quantity, _measuring("1")]
 
 
 def sourced(value: float, unit: str, reference: str) -> Quantity:
-    """Return a quantity that a document states."""
+    """Return a quantity that is stated in the document `reference`."""
     return Quantity(value=value, unit=unit, source=Source(tag="sourced", reference=reference))
 
 

@@ -22,7 +22,7 @@ class ManualFrame(Frozen):
     """A frame of a byte stream from the maker's manual; it reveals mistakes that driver and emulator have in common."""
 
     data: str = Field(pattern=r"^([0-9A-Fa-f]{2}\s*)+$")
-    """Bytes of the frame in hexadecimal."""
+    """Bytes of the frame, in hexadecimal notation."""
     readings: dict[str, float] = Field(min_length=1)
     """Readings that the manual states for the frame, by channel name, in the unit of the channel."""
 
@@ -42,7 +42,7 @@ class _Emulated(Frozen):
     """Options of the driver that are found only in the papers of a real device, with values for the emulated device.
     They apply where a rig file omits the options."""
     manual_frame: ManualFrame | None = None
-    """A frame of the maker's manual, which the driver must decode as the manual does; None: there is none."""
+    """A frame of the maker's manual, which the driver must decode as the manual does; None: no frame is given."""
 
 
 class SensorDescriptor(_Emulated):
@@ -103,7 +103,7 @@ class RigDescriptor(_Named):
     """``module:callable``, called without arguments: Verdicts of the simulation against known exact results."""
     work_precision: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a SensorDescriptor and ``rounds=``, a number of timed recordings: a CostStudy
-    of error against seconds per recording."""
+    of errors against seconds for each recording."""
     file: str | None = Field(default=None, pattern=WHERE)
     """``module:class``, a RigFile that also checks the rig's own settings, so that error messages name their line."""
     check: str | None = Field(default=None, pattern=WHERE)
@@ -186,7 +186,7 @@ class Parameter(Frozen):
     @model_validator(mode="after")
     def _default_may_be_given(self) -> Parameter:
         if not self.allows(self.default):
-            raise ValueError(f"default: {self.default:g} is given, and {self.range} is expected")
+            raise ValueError(f"default: {self.default:g} is given, and the range {self.range} is expected")
         return self
 
     def allows(self, value: float) -> bool:
@@ -249,8 +249,8 @@ class ProfileDescriptor(_Named):
     """A named profile of the normal force, and the import path of its code."""
 
     where: str = Field(pattern=WHERE)
-    """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. A scene, and
-    with it a recording, holds this path and not the profile's name."""
+    """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. Scenes
+    and recordings contain this path, not the profile's name."""
     parameters: dict[str, Parameter] = Field(default_factory=dict)
     """Parameters of the profile by name, each passed as a keyword in its own unit."""
 

@@ -36,7 +36,7 @@ class DeviceEntry(Frozen):
     @model_validator(mode="after")
     def _faults_of_emulators(self) -> DeviceEntry:
         if self.faults and not self.emulated:
-            raise ValueError("only an emulated device (link: emulated) has faults")
+            raise ValueError("faults are allowed only for an emulated device (link: emulated)")
         return self
 
 

@@ -37,7 +37,7 @@ class Indenter(Frozen):
     dimensions: dict[str, Quantity] = Field(default_factory=dict)
     """Dimensions of the shape by name; omitted dimensions have their defaults."""
     angle: Quantity = assumed(0.0, "deg", "the shape's own axes are those of the sensor")
-    """Rotation of the shape about the press axis, from x towards s [angle]."""
+    """Rotation of the indenter's shape about the press axis, from x towards s [angle]."""
 
     @model_validator(mode="before")
     @classmethod

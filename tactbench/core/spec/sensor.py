@@ -154,7 +154,7 @@ class Nuisances(Frozen):
     def _has_its_time_constants(self) -> Nuisances:
         for name in ("warm_up", "wander"):
             if getattr(self, name).value and f"{name}_tau" not in self.model_fields_set:
-                raise ValueError(f"{name} is not 0, so {name}_tau is needed")
+                raise ValueError(f"{name} is not 0, so its time constant {name}_tau is needed")
         return self
 
     def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
@@ -252,7 +252,7 @@ class SensorSpec(Frozen):
     """Kinds of channels whose transducer reads `tangential_displacement_mm` and `shear_mpa` of a SkinState, which are
     computed for these kinds only."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
-    """Parameters of the sensor's own transduction."""
+    """Parameters with which the sensor's own transducer computes readings."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
     """Noise, drift and scatter for simulation, by kind of channel."""
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)

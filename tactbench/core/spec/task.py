@@ -69,7 +69,7 @@ class ChannelTarget(Frozen):
 
 
 VECTOR_METRIC: Final = "mean_euclidean_error"
-"""Metric of targets that are vectors."""
+"""Name of the metric for targets that are vectors."""
 
 
 class VectorTarget(Frozen):
@@ -197,7 +197,7 @@ class TaskSpec(TaskFields):
     metric: str
     """Name of the primary metric; docs/glossary.md describes the metrics."""
     unit: str = "1"
-    """Unit of the primary metric."""
+    """Unit of the primary metric, 1 for a pure number."""
     equivalence: float | None = Field(default=None, ge=0)
     """Largest difference of scores that is irrelevant in practice, in the metric's unit; None: not stated."""
     scenes: tuple[PlannedScene, ...] = ()
@@ -211,7 +211,7 @@ class TaskSpec(TaskFields):
     """Names of the splits for the protocol `deployable`, the first by default: roles, session, in-session, few-shot-N,
     or a group's name."""
     estimators: tuple[str, ...]
-    """Names of the default estimators."""
+    """Names of the estimators that are evaluated by default."""
     baselines: tuple[str, ...]
     """Names of the trivial estimators, which are in every table; others are compared with the best of them."""
     published: tuple[Published, ...] = ()

@@ -32,7 +32,7 @@ _WORDS = {
 def parse(unit: str) -> tuple[float, Dimension]:
     """Return the factor to SI and the dimension of `unit`; raise UsageError, with similar names, if unknown."""
     if not unit.strip():
-        raise UsageError("The unit is empty.", hint="Write 1 for a pure number, count for a raw reading.")
+        raise UsageError("The unit is empty.", hint="Write 1 for a pure number, or count for a raw reading.")
     factor, exponents, sign = 1.0, (0,) * len(_BASE), 1
     for token in unit.replace("*", " * ").replace("/", " / ").split():
         if token in ("*", "/"):

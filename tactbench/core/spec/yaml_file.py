@@ -68,7 +68,7 @@ def _loaded(text: str, file: str) -> tuple[Any, Any]:
         problem = getattr(error, "problem", None) or "is not YAML"
         raise ConfigError(file, mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax.") from error
     except (ValueError, RecursionError) as error:  # a number or date that is not valid, or brackets without end
-        raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
+        raise ConfigError(file, None, f"has values that cannot be read: {error}.", hint="Quote texts.") from error
 
 
 def _collect_places(node: Any, at: Path_, places: Places, file: str) -> None:
@@ -116,9 +116,9 @@ def _explain(error: ValidationError, file: str, places: Places, model: type[Base
         schema = model.model_json_schema()
         parts = (schema, *schema.get("$defs", {}).values())
         meant = did_you_mean(str(loc[-1]), {key for part in parts for key in part.get("properties", {})}).strip()
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove it.")
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove the key.")
     if first["type"] == "missing":
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add the key.")
     text = ""
     if isinstance(node, yaml.ScalarNode):  # as it is written: yes, not True, and texts in quotes
         text = repr(node.value) if node.tag == _TEXT else str(node.value)
