@@ -37,5 +37,5 @@ def thread_limit(threads: int) -> AbstractContextManager[Any]:
 
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> Any:
-    """Return the numerical libraries that are loaded when the process has imported `n` modules (the key of a cache)."""
+    """Return the loaded numerical libraries; `modules`, the number of imported modules, is the key of a cache."""
     return importlib.import_module("threadpoolctl").ThreadpoolController()

@@ -62,7 +62,7 @@ class ForceEntry(NamedDevice):
     noise_n: float | None = Field(default=None, gt=0)
     """Standard deviation of the unloaded forces [N]; zeroing is refused above twice this value. None: unknown."""
     largest_zero_n: float | None = Field(default=None, gt=0)
-    """Largest mean force [N] while zeroing, in place of a tenth of the range, for example for a heavy indenter."""
+    """Largest zero force [N], in place of a tenth of the range, for a heavy indenter or a sensor never tared."""
 
 
 class Allowed(Frozen):
@@ -73,8 +73,8 @@ class Allowed(Frozen):
     lost_percent: float = Field(default=2.0, ge=0, le=100)
     """Largest share of a stream's rows that may be missing, or were dropped because writing was too slow [%]."""
     frozen_s: float = Field(default=2.0, gt=0)
-    """Longest time [s] without any change of the force sensor's channels, if most of its other rows differ from their
-    predecessors, or of the sensor's channels while the force changes."""
+    """Longest time [s] in which no force channel changes, though most of its other rows differ from the last, or no
+    channel of the sensor, though the force does; also a force that never changes, though the sensor does."""
 
 
 class EmulationSettings(Frozen):

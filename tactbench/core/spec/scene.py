@@ -58,7 +58,7 @@ class Indenter(Frozen):
         if self.shape is not None and self.radius is not None:
             raise ValueError(f"radius: only a cap has a radius; {self.shape!r} is sized by `dimensions`")
         if self.shape is None and self.dimensions:
-            raise ValueError(f"dimensions: {', '.join(self.dimensions)}: not of {self}; give `shape` too")
+            raise ValueError(f"dimensions: {', '.join(self.dimensions)} given for {self}, which has none; give `shape`")
         if self.angle.to("rad") and self.shape is None:
             raise ValueError(f"angle: {self.angle} is given, and {self} has rotational symmetry; leave `angle` out")
         return self
