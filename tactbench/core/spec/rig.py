@@ -164,7 +164,7 @@ class EffectDescriptor(_Named):
     produces: tuple[str, ...] = ()
     consumes: tuple[str, ...] = ()
     called_for: str = Field(pattern=WHERE)
-    """``module:callable``, called with (Scene, SensorSpec): a Reason for or against the effect; light."""
+    """``module:callable``, called with (Scene, SensorSpec): a Reason, found without heavy computation."""
     groups: tuple[str, ...] = ()
     """Names of groups to which the effect belongs in a scene's ``simulation.effects``: ``drift``, ``noise``."""
 
