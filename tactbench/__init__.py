@@ -1,6 +1,6 @@
-"""Tactbench: benchmark tactile sensors, and show what each score costs in time.
+"""Tactbench: benchmark tactile sensors, and show the computing time of each score.
 
-In Python: what `__all__` names, described in docs/python.md; each is imported when it is first used.
+The functions and classes in `__all__` are described in docs/python.md; each is imported at its first use.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""``python -m tactbench`` and the ``tactbench`` command."""
+"""Entry point of ``python -m tactbench`` and of the ``tactbench`` command."""
 
 from tactbench.core.cli import main
 

@@ -1,4 +1,4 @@
-"""Recordings of arrays in memory."""
+"""Conversion of arrays in memory into recordings."""
 
 from __future__ import annotations
 
@@ -35,34 +35,34 @@ def from_arrays(
     unit: str | None = None,
     simulated: bool = True,
 ) -> list[Recording]:
-    """Return arrays as recordings, which are checked as imported ones; their files last as long as this process.
+    """Return arrays as recordings, checked like imported recordings; their files exist as long as this process.
 
     Parameters
     ----------
     X
-        (n, channels) readings, or a DataFrame, whose columns that are not named below are readings. NaN is no sample.
+        (n, channels) readings, or a DataFrame; its columns not named by other arguments are readings. NaN: no sample.
     y
-        (n,) numbers, (n, d) vectors, or (n,) classes: texts, truth values, or numbers of an integer type. NaN is no
-        answer. Of a DataFrame the name of a column, or a list of names; `time_s` and `groups` alike.
+        (n,) numbers, (n, d) vectors, or (n,) classes: texts, truth values, or numbers of an integer type. NaN: no
+        answer. If `X` is a DataFrame, a column's name or a list of names; likewise `time_s` and `groups`.
     time_s
-        (n,) times, rising within each group [s]; None: there is no clock.
+        (n,) times, ascending within each group [s]; None: there is no clock.
     groups
-        (n,) the session of each row, each a recording; None: all rows are one.
+        (n,) session of each row; each session becomes a recording. None: all rows are one recording.
     sensor
-        A name: lower case, digits, - and _.
+        Name of the sensor: lower-case letters, digits, - and _.
     task
         Name of an installed task whose target `y` is, or a new name.
     unit
-        Unit of `y`; None: the task's, or 1.
+        Unit of `y`; None: the unit of the task, or 1 for a new task.
     simulated
-        Whether rows are marked SIM and not ranked against measured ones; False where a real sensor was read.
+        True if rows are marked SIM and not ranked against measured rows; False for readings of a real sensor.
 
     Raises
     ------
     UsageError
-        If an argument cannot be used.
+        If an argument is not valid.
     MappingError
-        If a channel has no sample, or the arrays could not be imported otherwise.
+        If a channel has no sample at all, or the arrays cannot be imported for another reason.
     """
     given: Any
     frame: Any = X if hasattr(X, "columns") else None
@@ -96,7 +96,7 @@ def from_arrays(
         texts, columns["y"] = np.unique(_texts(columns["y"]), return_inverse=True)
         notes = {target.name: {"column": 0, "values": dict(enumerate(texts.tolist()))}}
     elif isinstance(target, SlipTarget):
-        raise wrong("task", task, "the name of a task of numbers, vectors or classes, or a new name")
+        raise wrong("task", task, "the name of a task that predicts numbers, vectors or classes, or a new name")
     else:
         several = target.components if isinstance(target, VectorTarget) else (target,)
         parts = [(one.name or "y", one.kind, unit or one.unit) for one in several]
@@ -107,9 +107,9 @@ def from_arrays(
         except (TypeError, ValueError) as error:
             raise wrong(argument, given, f"numbers ({error})") from error
         if np.isinf(numbers[-1]).any():
-            raise wrong(argument, given, "finite numbers, and NaN where there is none")
+            raise wrong(argument, given, "finite numbers, or NaN for rows without a number")
     if numbers[0].shape[1] != max(len(parts), 1):
-        raise wrong("y", y, f"{max(len(parts), 1)} values a row for task {task!r}")
+        raise wrong("y", y, f"{max(len(parts), 1)} values for each row, as task {task!r} expects")
     rows = np.column_stack(numbers)
     streams = {"readings": {"table": "rows", "annotations": notes, "channels": [
         _channel(place, name, "taxel", "1") for place, name in enumerate(channels, numbers[0].shape[1])]}}  # fmt: skip
@@ -128,8 +128,8 @@ def from_arrays(
         })  # fmt: skip
     except ValidationError as error:
         raise UsageError(
-            f"sensor={sensor!r}, task={task!r}, unit={unit!r} or a name in X cannot be used: {complaint(error)}.",
-            hint="Names are of letters, digits, - and _, and begin with a letter.",
+            f"sensor={sensor!r}, task={task!r}, unit={unit!r} or a name in X is not valid: {complaint(error)}.",
+            hint="Use names of letters, digits, - and _ that begin with a letter.",
         ) from error
     labels, raws = columns["groups"].astype(np.str_), []
     for place, label in enumerate(dict.fromkeys(labels.tolist())):
@@ -147,7 +147,7 @@ def _channel(place: int, name: str, kind: str, unit: str) -> dict[str, Any]:
 
 
 def _target(answers: npt.NDArray[Any], unit: str | None) -> ChannelTarget | VectorTarget | LabelTarget:
-    """Return the target of a new task: a label unless answers are floats or vectors."""
+    """Return the target of a new task: a channel for floats and vectors, else a label."""
     if answers.ndim == 1 and answers.dtype.kind != "f":
         return LabelTarget(name="y")
     kind: Any = "force" if unit in ("N", "mN", "kN") else "other"
@@ -158,7 +158,7 @@ def _target(answers: npt.NDArray[Any], unit: str | None) -> ChannelTarget | Vect
 
 
 def _texts(answers: npt.NDArray[Any]) -> list[str]:
-    """Return classes as texts in the order of their values; NaN and None are empty."""
+    """Return classes as texts whose alphabetical order is that of the values; NaN and None become empty texts."""
     if answers.dtype.kind in "iu":
         return [f"{one:0{len(str(answers.max()))}d}" for one in answers]
     return ["" if one is None or one != one else str(one) for one in answers.tolist()]

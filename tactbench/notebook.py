@@ -1,4 +1,4 @@
-"""Tasks, scores and results in Python; :func:`evaluate` computes the row that a cell of a run has."""
+"""Tasks, scores and results in Python; :func:`evaluate` computes the same row as a cell of a run."""
 
 from __future__ import annotations
 
@@ -75,26 +75,26 @@ def load_task(
     step: int = 1,
     seed: int = 1,
 ) -> TaskData:
-    """Return a task on recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
+    """Return the data of a task on recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
 
     Parameters
     ----------
     task
-        Name of a task that is installed or declared beside the recordings, or its spec.
+        Name of a task that is installed or declared beside the recordings, or a task's spec.
     recordings
-        Those of :func:`open_recordings`, files, folders or globs.
+        Recordings from :func:`open_recordings`, or files, folders or globs.
     protocol
-        Name of the protocol that makes rows of recordings; see docs/protocols.md.
+        Name of the protocol by which recordings become rows; see docs/protocols.md.
     split
         Name of a split; an object with scikit-learn's ``split(X, y, groups)``; or pairs of index arrays (train, test)
-        over the rows of `X`. None: the task's first that the recordings can serve.
+        over the rows of `X`. None: the task's first split that the recordings can serve.
     groups
         Groups for a splitter and for intervals: the name of a label of the recordings (session, object …), or an array
-        (n,). None: there is no interval.
+        (n,). None: no interval is computed.
     window, step
-        Rows of a window, and from its end to that of the next (1). `X` is then (n, window, features): each window lies
+        Rows of a window, and rows from one window to the next (1). `X` is then (n, window, features): each window lies
         in one recording and in one fold, and has the label of its last row. Training windows that share a row with a
-        test window are in no fold.
+        test window are left out of that fold.
     seed
         Seed of split ``shuffled``.
 
@@ -108,9 +108,9 @@ def load_task(
     Raises
     ------
     UsageError
-        If an argument cannot be used, or these recordings cannot be split so.
+        If an argument is not valid, or the recordings cannot be divided by the split.
     DataError
-        If nothing is left to evaluate; its kind NotApplicable if these recordings do not have what the task needs.
+        If no row is left to evaluate; NotApplicable (a DataError) if the recordings lack data that the task needs.
     """
     options = Options(protocol, split, groups, window=window, step=step, seed=seed)
     spec, _, paths, how = question(task, recordings, options)
@@ -118,7 +118,7 @@ def load_task(
 
 
 class Rows(list[dict[str, Any]]):
-    """Rows as mappings, whose text is that of `tables`."""
+    """Rows as mappings, printed as the text of `tables`."""
 
     def __init__(self, rows: Iterable[dict[str, Any]], tables: Sequence[TextTable]) -> None:
         super().__init__(rows)
@@ -131,13 +131,13 @@ class Rows(list[dict[str, Any]]):
         return html(self.tables)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return a pandas DataFrame, a line a row; raises UsageError if pandas is not installed."""
+        """Return a pandas DataFrame with one line for each row; raise UsageError if pandas is not installed."""
         found: pandas.DataFrame = library("pandas").DataFrame(list(self))
         return found
 
 
 class Results(Rows):
-    """The rows of cells, one a cell over its replicates, in the order of the leaderboard.
+    """Rows of results, one for each cell over its replicates, in the order of the leaderboard.
 
     A row has the keys of ``tactbench leaderboard --format json`` (docs/results.md).
     """
@@ -149,13 +149,13 @@ class Results(Rows):
         self.table = table
 
     def best(self, count: int = 1) -> Results:
-        """Return the first `count` rows of each sensor and question, with their places among all."""
+        """Return the first `count` rows for each sensor and question, with their ranks among all rows."""
         return Results(best(self.table, count))
 
     def compare(self, a: str, b: str, task: str | None = None) -> Rows:
         """Compare two sensors, estimators, protocols or splits replicate by replicate, as ``tactbench compare`` does.
 
-        Raises UnknownNameError if no data set has rows of both names, or the two are not of one kind.
+        Raises UnknownNameError if no data set has rows of both names, or if they are names of different kinds.
         """
         found: list[PairwiseComparison] = []
         unknown = UnknownNameError("row", a, ())
@@ -170,23 +170,23 @@ class Results(Rows):
 
 
 class Result(Results):
-    """The score of one estimator, with the task's trivial answers beside it as further rows.
+    """The score of one estimator, with the scores of the task's trivial estimators as further rows.
 
     Attributes
     ----------
     score
-        Metric over the test rows of all folds together.
+        Metric over the pooled test rows of all folds.
     interval
-        Ends of its interval over the units that the split holds out (``row["ci_method"]``), the upper one infinite
-        where it is open; None of fewer than five units, whose own scores are ``row["replicate_scores"]``.
+        Interval of the score over the units that the split holds out (``row["ci_method"]``); the upper end is infinite
+        if open. None for fewer than five units, whose own scores are in ``row["replicate_scores"]``.
     trivial
-        Scores of the task's trivial answers by name; None of one that failed.
+        Scores of the task's trivial estimators by name; None for an estimator that failed.
     fold_scores
         Scores by name of the fold, in the order of ``load_task(...).folds``.
     row
         The estimator's row: metric, unit, times, remarks …
     answers
-        Truth and predictions of the test rows as arrays; classes are indices.
+        True values and predictions for the test rows, as arrays; classes are indices.
     """
 
     def __init__(
@@ -206,7 +206,7 @@ class Result(Results):
 
     @property
     def recording_scores(self) -> dict[str, float]:
-        """Return the score over the test rows of each recording by its name; NaN where the metric is undefined."""
+        """Return the score over the test rows of each recording, by its name; NaN if the metric is undefined."""
         one, found = self.answers, {}
         with np.errstate(all="ignore"):
             for place in np.unique(one.recording):
@@ -217,7 +217,7 @@ class Result(Results):
 
     @property
     def predictions(self) -> pandas.DataFrame:
-        """Return a pandas DataFrame, a line a test row; raises UsageError if pandas is not installed.
+        """Return a pandas DataFrame with one line for each test row; raise UsageError if pandas is not installed.
 
         Its columns are recording, row (place in the recording), time_s, fold (name), y_true and y_pred: class labels,
         numbers, or a column for each component of a vector.
@@ -234,15 +234,15 @@ class Result(Results):
         return frame
 
     def plot(self) -> Figure:
-        """Return a figure of answers over the truth, a panel a component, or a confusion matrix of classes.
+        """Return a figure of predictions against true values, one panel for each component, or a confusion matrix.
 
-        Raises NotApplicable for events, whose figure is that of ``tactbench report``.
+        Raises NotApplicable for events, whose figure is part of ``tactbench report``.
         """
         from matplotlib.figure import Figure
         from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
 
         if self.row["events"]:
-            raise NotApplicable("Events are not drawn here.", hint="See row['operating_points'].")
+            raise NotApplicable("No figure is available for events.", hint="See row['operating_points'].")
         frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
         figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
         for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):
@@ -274,22 +274,22 @@ def evaluate(
     step: int = 1,
     seed: int = 1,
 ) -> Result:
-    """Score an estimator on recordings in this process, and the task's trivial answers beside it.
+    """Score an estimator on recordings in this process, together with the task's trivial estimators.
 
     Parameters
     ----------
     estimator
-        Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, of which each fold fits a copy, or the name of
-        an installed one. Classes in `y` are indices.
+        Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, fitted as a copy on each fold, or the name of
+        an installed estimator. Classes in `y` are indices.
     task, recordings, protocol, split, groups, window, step
-        As of :func:`load_task`.
+        As in :func:`load_task`.
     metric
         Name of a metric of docs/protocols.md or of a scorer of scikit-learn, such a scorer, or a function of (y,
-        prediction). None: the task's. The score of a scorer of an error is without its negative sign.
+        prediction). None: the task's metric. Scores of scorers of errors lose their negative sign.
     greater_is_better
-        Whether a higher score of a function is better.
+        True if a higher value is better, where `metric` is a function.
     params
-        Further arguments of ``fit``, as of ``sklearn.model_selection.cross_validate``: arrays (n,) of a value for each
+        Further arguments of ``fit``, as of ``sklearn.model_selection.cross_validate``: arrays (n,), one value for each
         row of ``load_task(...).X`` are cut to the rows of a fold. ``groups`` may be the name of a label. A search of
         parameters by cross-validation is given the split's groups.
     seed
@@ -299,9 +299,9 @@ def evaluate(
     Raises
     ------
     UsageError, DataError
-        As of :func:`load_task`.
+        As in :func:`load_task`.
     PluginContractError
-        If a prediction is not finite, or no class.
+        If a prediction is not finite, or is not a class.
     """
     options = Options(protocol, split, groups, metric, greater_is_better, params, window, step, seed)
     mine, *trivial = cells_of(name_of(estimator), estimator, task, recordings, options)
@@ -325,39 +325,39 @@ def run(
     tasks: str | TaskSpec | Sequence[str | TaskSpec] | Mapping[str, Any] = (),
     **options: Any,
 ) -> Results:
-    """Acquire, evaluate and rank, as ``tactbench run`` does; or score estimators on several data sets.
+    """Acquire, evaluate and rank, as ``tactbench run`` does, or score estimators on several data sets.
 
     Parameters
     ----------
     sensor, task
-        Names, one or several.
+        Name or names of sensors, and of tasks.
     estimator
         Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Beside
         objects, only the tasks' trivial answers are run.
     recordings, out
-        Folder of recordings to replay, or all recordings of one; the result folder.
+        Folder of recordings to replay, or all recordings in one folder; the result folder.
     data, estimators, tasks
         Recordings of several data sets by name, estimators as of `estimator`, and one task or several. Each data set
         has its own tables, and a result folder in `out`.
     **options
-        Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
+        Other options of ``tactbench run`` by name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
         ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated. With
         `data`: the arguments of :func:`evaluate`, and `jobs`, the number of processes (None: all cores). Each of these,
         and `tasks`, may be a mapping from names of data sets or of estimators: ``split={"pad": GroupKFold(3)}``.
 
     Notes
     -----
-    Named estimators are evaluated in child processes, as by the verb, and stored in `out`. Objects are evaluated
-    afterwards in this process, on the recordings of the other rows, and are in the returned table only. An option or a
+    Named estimators are evaluated in child processes, as by the command, and stored in `out`. Objects are evaluated
+    afterwards in this process, on the same recordings, and are in the returned table only. An option or a
     name that is not valid raises UsageError before anything is run.
 
     With `data` joblib evaluates everything; single answers are timed with ``jobs=1`` only. Rows are reused while
-    object, metric, data and code are the same; `remarks` of a row state where that cannot be checked.
+    object, metric, data and code are the same; if this cannot be checked, `remarks` of the row state it.
     """
     if data is not None:
         given = {"sensor": sensor, "task": task, "estimator": estimator, "recordings": recordings}
         if misplaced := [name for name, value in given.items() if value not in ((), None)]:
-            raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
+            raise UsageError(f"`{misplaced[0]}` excludes `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = named(estimator)
     given = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
@@ -385,7 +385,7 @@ def _over_data(
     jobs: int | None = None,
     **options: Any,
 ) -> Results:
-    """Return the rows of estimators on data sets; see :func:`run`."""
+    """Return the rows of estimators on several data sets, for :func:`run`."""
     names, objects = named(estimators)
     every: dict[str, str | Estimator] = {**objects, **dict(zip(names, names, strict=True))}
     if not isinstance(data, Mapping) or not data:
@@ -406,7 +406,7 @@ def _over_data(
     for name, recordings in data.items():
         some = chosen(tasks, name)
         if not some:
-            raise wrong("tasks", tasks, f"the task of {name!r}: a name or a TaskSpec, or several")
+            raise wrong("tasks", tasks, f"for {name!r} a name of a task or a TaskSpec, or several")
         sensors = grouped(opened_as(f"data[{name!r}]", recordings), lambda one: one.sensor.name).values()
         for task, mine in product([some] if isinstance(some, str | TaskSpec) else some, sensors):
             for called, given in every.items():
@@ -431,27 +431,27 @@ def _over_data(
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
-    """Return the rows of a result folder, as ``tactbench leaderboard`` shows them; raises UsageError if it has none."""
+    """Return the rows of a result folder, as ``tactbench leaderboard`` shows them; raise UsageError if it has none."""
     store = opened(Path(folder))
     return Results(table_of(store, shown_rows(store)))
 
 
 def _folder(recordings: Recordings | None) -> AnyPath | None:
-    """Return the folder that a run replays; raises UsageError unless the recordings are all of one folder."""
+    """Return the folder that a run replays; raise UsageError unless all recordings are in one folder."""
     if recordings is None or isinstance(recordings, str | os.PathLike):
         return recordings
     paths = {one.path for one in open_recordings(recordings)}
     folders = {path.parent for path in paths}
     if len(folders) != 1 or {one.path for one in open_recordings(*folders)} != paths:
         raise UsageError(
-            f"A run replays a folder of recordings, and the {len(paths)} given are not all of one.",
+            f"A run replays a folder of recordings, but these {len(paths)} are not those of one folder.",
             hint="Give a folder, or use `evaluate`.",
         )
     return folders.pop()
 
 
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
-    """Return the row of an object for the question and the recordings of another row."""
+    """Return the row of an estimator object for the question and the recordings of another row."""
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
     task = with_declared_of(installed(), [row]).tasks[cell.task].spec
     paths = [folder / named_file(one) for one in row["recordings"]]

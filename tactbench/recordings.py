@@ -1,4 +1,4 @@
-"""Recordings in Python: what ``tactbench.open_recordings`` and ``tactbench.dataset`` give."""
+"""Recordings in Python, as ``tactbench.open_recordings`` and ``tactbench.dataset`` return them."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ AnyPath = str | os.PathLike[str]
 
 @dataclass(frozen=True, repr=False)
 class Stream(StreamData):
-    """Channels of a recording that share a clock: `data` (n, channels) as stored, `quality`, `t_ns`, `annotations`."""
+    """Channels of a recording with one clock: `data` (n, channels) as stored, `quality`, `t_ns`, `annotations`."""
 
     start_ns: int = 0
-    """When the recording's first sample was, of any stream."""
+    """Time of the recording's first sample in any stream [ns]."""
 
     def __repr__(self) -> str:
         return f"<Stream {self.spec.name}: {len(self.data)} rows of {', '.join(one.name for one in self.channels)}>"
 
     @property
     def channels(self) -> tuple[ChannelSpec, ...]:
-        """Return what is known of each channel: name, kind, unit, range, position."""
+        """Return the facts about each channel: name, kind, unit, range, position."""
         return self.spec.channels
 
     @property
     def time_s(self) -> FloatArray | None:
-        """Return (n,) seconds since the recording's first sample; None where it has no clock."""
+        """Return (n,) times since the recording's first sample [s]; None if the stream has no clock."""
         return None if self.t_ns is None else np.asarray((self.t_ns - self.start_ns) * 1e-9)
 
 
@@ -61,17 +61,17 @@ class Recording:
 
     @cached_property
     def meta(self) -> RecordingMeta:
-        """Description of the recording; raises FormatError if the file is no recording."""
+        """Metadata of the recording; raises FormatError if the file is no recording."""
         return read_meta(self.path)
 
     @property
     def sensor(self) -> SensorSpec:
-        """Return the sensor's whole spec."""
+        """Return the complete specification of the sensor."""
         return self.meta.sensor
 
     @cached_property
     def streams(self) -> Mapping[str, Stream]:
-        """The streams that hold data by name, the sensor's first, then the reference's."""
+        """Streams with data, by name: first those of the sensor, then those of the reference."""
         with open_recording(self.path) as file:
             read = {name: file.read(name) for name in file.stream_names}
         start_ns = min((int(one.t_ns[0]) for one in read.values() if one.t_ns is not None and len(one.t_ns)), default=0)
@@ -79,14 +79,14 @@ class Recording:
 
     @property
     def reference(self) -> Mapping[str, Stream]:
-        """Return the streams that are not the sensor's own: force-torque sensor, probe."""
+        """Return the streams of other devices than the sensor: force-torque sensor, probe."""
         names = {spec.name for spec in self.meta.reference}
         return {name: stream for name, stream in self.streams.items() if name in names}
 
     def to_dataframe(self, stream: str | None = None) -> pandas.DataFrame:
-        """Return a stream (None: the sensor's first) as a pandas DataFrame: a column a channel, then labels of rows.
+        """Return a stream (None: the sensor's first) as a pandas DataFrame: a column for each channel, then row labels.
 
-        NaN is no sample. Raises FormatError if there is no such stream, UsageError if pandas is not installed.
+        NaN: no sample. Raises FormatError if there is no such stream, UsageError if pandas is not installed.
         """
         pd, one = library("pandas"), self._stream(stream)
         index = None if one.time_s is None else pd.Index(one.time_s, name="time_s")
@@ -96,8 +96,8 @@ class Recording:
     def to_xarray(self, stream: str | None = None) -> xarray.Dataset:
         """Return a stream as an xarray Dataset with time and channel coordinates.
 
-        It is what ``xarray.open_dataset(path, group="streams/NAME", engine="h5netcdf")`` reads of the file, with labels
-        of rows and units of channels beside. Raises as :meth:`to_dataframe`, UsageError if xarray is not installed.
+        It equals ``xarray.open_dataset(path, group="streams/NAME", engine="h5netcdf")``, with the addition of labels
+        of rows and units of channels. Errors are as in :meth:`to_dataframe`; UsageError if xarray is not installed.
         """
         xr, one = library("xarray"), self._stream(stream)
         rows, times = ("row", np.arange(len(one.data))) if one.t_ns is None else ("t_ns", one.t_ns)
@@ -114,26 +114,26 @@ class Recording:
     def _stream(self, name: str | None) -> Stream:
         found = self.streams.get(next(iter(self.streams), "") if name is None else name)
         if found is None:
-            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {', '.join(self.streams)}.")
+            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"Its streams: {', '.join(self.streams)}.")
         return found
 
 
 def library(name: str) -> Any:
-    """Return a library that may be missing; raises UsageError where it is."""
+    """Import and return an optional library; raise UsageError if it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:
         raise UsageError(
-            f"This needs {name}, which cannot be imported: {error}.", hint=f"Install it with `pip install {name}`."
+            f"The call needs {name}, which cannot be imported: {error}.", hint=f"Install it with `pip install {name}`."
         ) from error
 
 
 Recordings = Recording | AnyPath | Iterable[Recording | AnyPath]
-"""Recordings as functions take them: those of :func:`open_recordings`, files, folders or globs, one or several."""
+"""Recordings as arguments of functions: results of :func:`open_recordings`, files, folders or globs, one or several."""
 
 
 def open_recordings(path_or_paths: Recordings) -> list[Recording]:
-    """Open recordings; their samples are read when they are looked at.
+    """Open recordings; their samples are read at first use.
 
     Parameters
     ----------
@@ -143,13 +143,13 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
     Returns
     -------
     list of Recording
-        Each file once, those of a folder or a glob in order of their paths; MissingRecordingError if there is none.
+        Each file once; files of a folder or a glob are in order of their paths. MissingRecordingError: no file.
     """
     return opened_as("path_or_paths", path_or_paths)
 
 
 def opened_as(argument: str, given: Recordings) -> list[Recording]:
-    """Return what was given under the name of an argument as :func:`open_recordings` does."""
+    """Return the recordings given as the argument `argument`, as :func:`open_recordings` does."""
     if isinstance(given, Recording):
         return [given]
     takes = "recordings, files, folders or globs, one or several"
@@ -166,26 +166,26 @@ def opened_as(argument: str, given: Recordings) -> list[Recording]:
         return [Recording(path)]
     paths = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207  (it takes absolute ones too)
     if not paths:
-        raise MissingRecordingError(f"{argument}={str(given)!r}: there is no such file.", hint=f"It takes {takes}.")
+        raise MissingRecordingError(f"{argument}={str(given)!r}: there is no such file.", hint=f"Give {takes}.")
     return opened_as(argument, paths)
 
 
 def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
-    """Return the recordings of a public data set; what is missing is fetched, checked, imported and kept.
+    """Return the recordings of a public data set; missing files are fetched, checked, imported and kept.
 
     Parameters
     ----------
     name
-        As ``tactbench datasets`` lists them, or a mapping file that states its source.
+        Name of a data set in ``tactbench datasets``, or a mapping file that states its source.
     root
-        A folder that holds a copy, or whose sub-folder does.
+        Folder that contains, itself or in a sub-folder, a copy of the files.
 
     Raises
     ------
     UnknownNameError
         If there is no data set of that name.
     MissingRecordingError, NotApplicable
-        If a file cannot be had, is not the one that is meant, or lies at no public address.
+        If a file cannot be fetched, has the wrong checksum, or has no public address.
     """
     from tactbench.core.recording.datasets import dataset_called
 

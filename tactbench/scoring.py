@@ -1,4 +1,4 @@
-"""Cells whose estimator, split, metric, parameters of ``fit`` and windows are given as objects in Python."""
+"""Evaluation of cells whose estimator, split, metric, ``fit`` parameters or windows are Python objects."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Row = dict[str, Any]
 
 
 class Options(NamedTuple):
-    """Arguments of :func:`tactbench.evaluate` that may differ by data set or estimator."""
+    """Arguments of :func:`tactbench.evaluate` that may differ between data sets or estimators."""
 
     protocol: str = "deployable"
     split: Any = None
@@ -56,9 +56,9 @@ class Options(NamedTuple):
 def question(
     task: str | TaskSpec, recordings: Recordings, options: Options
 ) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:
-    """Return the task, the JSON that declares it beside the recordings, the files, and the arguments of its folds.
+    """Return the task, its JSON declaration beside the recordings, the files, and the arguments for its folds.
 
-    The JSON is empty for an installed task; the last are those of :func:`tactbench.core.evaluation.folds.load_task`.
+    The JSON is empty for an installed task; the arguments are for :func:`tactbench.core.evaluation.folds.load_task`.
     """
     protocol, split, groups, *_, window, step, seed = options
     for name, given, least in (("window", 1 if window is None else window, 1), ("step", step, 1), ("seed", seed, 0)):
@@ -72,7 +72,7 @@ def question(
         owned = registry.tasks.owned(task)
         task, declared = owned.descriptor.spec, owned.declared
     if not isinstance(task, TaskSpec):
-        raise wrong("task", task, "a name of `tactbench list tasks`, one declared beside the recordings, or a TaskSpec")
+        raise wrong("task", task, "a name in `tactbench list tasks`, a task declared beside recordings, or a TaskSpec")
     plain = without_options(str(protocol))
     if plain not in task.protocols and not is_probe(plain):
         raise UnknownNameError(f"protocol of task {task.name!r}", str(protocol), task.protocols)
@@ -81,24 +81,24 @@ def question(
             raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
         split = OwnSplit(split, groups)
     elif groups is not None:
-        raise wrong("groups", groups, "groups for a splitter in `split` (`params` has those of `fit`)")
+        raise wrong("groups", groups, "given only for a splitter object in `split`; groups for `fit` go into `params`")
     return task, declared, paths, {"split": split, "window": window or 0, "step": step, "seed": seed}
 
 
 class Work(NamedTuple):
-    """A cell that is evaluated in this process, with its task and files."""
+    """A cell to be evaluated in this process, with its task and files."""
 
     cell: Cell
     task: TaskSpec
     paths: tuple[Path, ...]
     how: dict[str, Any]
-    """the caller's objects, as :func:`solve` takes them"""
+    """the user's objects, in the form that :func:`solve` takes"""
 
 
 def cells_of(
     name: str, estimator: str | Estimator, task: str | TaskSpec, recordings: Recordings, options: Options
 ) -> list[Work]:
-    """Return the cell of an estimator, and those of the task's trivial answers."""
+    """Return the cell of an estimator, and the cells of the task's trivial estimators."""
     spec, declared, paths, how = question(task, recordings, options)
     given, params = None if isinstance(estimator, str) else estimator, options.params
     scored = metric_of(options.metric, options.greater_is_better, spec)
@@ -106,9 +106,9 @@ def cells_of(
         unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
         spec = spec.model_copy(update={"metric": scored.name, "unit": unit, "equivalence": None, "published": ()})
     if params is not None and (given is None or not isinstance(params, Mapping)):
-        raise wrong("params", params, "a mapping of arguments of `fit` of an object to their values")
+        raise wrong("params", params, "a mapping of arguments of an object's `fit` to their values")
     if options.window and given is None:
-        raise wrong("estimator", estimator, "an object where `window` is given")
+        raise wrong("estimator", estimator, "an object, not a name, if `window` is given")
     cell = Cell(
         sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=options.protocol,
         split=getattr(how["split"], "name", how["split"]), estimator=name, params=(), baseline=False, seed=options.seed,
@@ -121,7 +121,7 @@ def cells_of(
 
 
 def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
-    """Return the metric of a name, a scikit-learn scorer, or a function of (y, prediction); of None the task's."""
+    """Return the metric of a name, a scikit-learn scorer, or a function of (y, prediction); None: the task's."""
     own, scorer = metric_called(task.metric), given
     found = own if given is None else None
     if isinstance(given, str):
@@ -146,19 +146,19 @@ def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Met
 
 
 def name_of(estimator: str | Estimator) -> str:
-    """Return the name of an estimator in tables: that of its class, or of a pipeline those of its steps."""
+    """Return the name of an estimator in tables: its class, or for a pipeline the classes of its steps."""
     if isinstance(estimator, str):
         return estimator
     # Some objects of scikit-learn have no `predict` before `fit`, but their class has it.
     able = (hasattr(estimator, name) or hasattr(type(estimator), name) for name in ("fit", "predict"))
     if isinstance(estimator, type) or not all(able):
-        raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
+        raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or an installed estimator's name")
     steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
     return "+".join(steps) or type(estimator).__name__
 
 
 def answered(work: Work) -> Solved:
-    """Return the row and the answers of a cell; the states of global random generators are restored afterwards."""
+    """Return the row and the answers of a cell; the states of the global random generators are restored afterwards."""
     described = installed().estimators[work.cell.estimator] if work.how["given"] is None else PLAIN
     states = random.getstate(), np.random.get_state()  # noqa: NPY002  (cells seed this old generator)
     try:
@@ -169,7 +169,7 @@ def answered(work: Work) -> Solved:
 
 
 def ended(work: Work, simulated: bool) -> Solved:
-    """Return the row of a cell, whether it finishes or not, and its answers."""
+    """Return the row and the answers of a cell, also for a cell that fails."""
     try:
         return answered(work)
     except Exception as error:
@@ -180,7 +180,7 @@ Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ..
 
 
 def named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
-    """Return the names of installed estimators, and the objects by name; raises UsageError for a repeated name."""
+    """Return the names of installed estimators, and the objects by name; raise UsageError for a repeated name."""
     if not isinstance(estimator, Mapping):
         several = list(estimator) if isinstance(estimator, list | tuple) else [estimator]
         pairs = [(name_of(one), one) for one in several]
@@ -190,14 +190,14 @@ def named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
     names = [one for _, one in pairs if isinstance(one, str)]
     if len(objects) + len(names) < len(pairs) or any(name in installed().estimators for name in objects):
         raise UsageError(
-            f"Two estimators have one name: {', '.join(name for name, _ in pairs)}.",
+            f"Two estimators have the same name: {', '.join(name for name, _ in pairs)}.",
             hint="Give a mapping of names to objects, with names that no installed estimator has.",
         )
     return names, objects
 
 
 def side_by_side(work_of: Mapping[str, Mapping[str, Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
-    """Return the rows of cells by data set, from its result folder or evaluated in one of `jobs` processes."""
+    """Return the rows of cells by data set, read from its result folder or computed in one of `jobs` processes."""
     import joblib
 
     keys, rows = Keys(installed()), {name: dict[str, Row]() for name in work_of}
@@ -230,12 +230,12 @@ def side_by_side(work_of: Mapping[str, Mapping[str, Work]], out: Path, jobs: int
                 display.advance(work.cell.name, stopped=row["status"] in STOPPED)
         except (BrokenProcessPool, PicklingError) as error:
             raise EngineError(
-                f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
+                f"A process that evaluates cells has ended, or objects cannot be sent to it: {error}",
                 hint="Finished rows are kept. Give jobs=1 to evaluate the rest in this process.",
             ) from error
     return {name: [rows[name][cell] for cell in works] for name, works in work_of.items()}
 
 
 def _in_place(place: int, work: Work) -> tuple[int, Solved]:
-    """Return a cell's place among those to compute, and its row and answers."""
+    """Return a cell's place among the cells to compute, with its row and answers."""
     return place, ended(work, simulated=False)

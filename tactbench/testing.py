@@ -1,7 +1,7 @@
-"""The checks of ``tactbench check`` for a plugin's own tests with pytest.
+"""Access to the checks of ``tactbench check`` from a plugin's own tests with pytest.
 
-The plugin must be installed (``pip install -e .``), as it is found by its entry point.
-``tactbench check --list`` names the checks.
+The plugin must be installed (``pip install -e .``), because it is found by its entry point.
+``tactbench check --list`` lists the checks.
 
 >>> import pytest
 >>> from tactbench.testing import plugin_checks
@@ -27,20 +27,20 @@ MODES: tuple[Mode, ...] = ("passive", "recording")
 
 @dataclass(frozen=True)
 class PluginCheck:
-    """One check of one plugin, to be called in a test; its text is its name.
+    """One check of one plugin, callable in a test; its text form is the check's name.
 
-    The checks of a sensor, task … are run together, in one child process, when the first is called.
+    The checks of a sensor, task … are all run in one child process when the first check is called.
     """
 
     name: str
-    """``kind-check``."""
+    """Name of the check, ``kind-check``."""
     report: Callable[[], CheckReport]
 
     def __str__(self) -> str:
         return self.name
 
     def __call__(self) -> None:
-        """Raise CheckFailed if the plugin fails it; skip the test if it does not apply to the plugin."""
+        """Raise CheckFailed if the plugin fails this check; skip the test if the check does not apply to the plugin."""
         import pytest
 
         check = self.name.partition("-")[2]
@@ -58,14 +58,14 @@ def _report(subject: Subject, recording: Path | None) -> CheckReport:
 
 
 def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginCheck]:
-    """Return the checks of `name`, for ``pytest.mark.parametrize``; raises UnknownNameError.
+    """Return the checks of `name` for ``pytest.mark.parametrize``; raise UnknownNameError for an unknown name.
 
     Parameters
     ----------
     name
-        Name of a sensor, rig, device, task, estimator, effect, indenter or profile, or of a plugin with several.
+        Name of a sensor, rig, device, task, estimator, effect, indenter or profile, or of a plugin that has several.
     recording
-        A recording of the sensor, which its checks then cover.
+        A recording of the sensor, which is then checked too.
     """
     return [
         PluginCheck(f"{subject.kind}-{one.name}", partial(_report, subject, recording))
@@ -75,5 +75,5 @@ def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginChe
 
 
 def check_plugin(name: str, *, recording: Path | None = None) -> list[CheckReport]:
-    """Run the checks of `name` and return their outcomes; raises UnknownNameError."""
+    """Run the checks of `name` and return their outcomes; raise UnknownNameError for an unknown name."""
     return [_report(subject, recording) for subject in subjects_named(installed(), name)]

@@ -144,8 +144,8 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
         (lambda folder: tactbench.evaluate("force", Ridge(), folder), "task=Ridge"),
         (lambda folder: tactbench.run(tasc="force"), "'task'"),
         (lambda folder: tactbench.run(task="force", repeats=0), "^repeats: "),
-        (lambda folder: tactbench.run(task="force", estimator={"ridge": Ridge()}), "one name"),
-        (lambda folder: tactbench.run(task="force", recordings=tactbench.open_recordings(folder)[1:]), "all of one"),
+        (lambda folder: tactbench.run(task="force", estimator={"ridge": Ridge()}), "same name"),
+        (lambda folder: tactbench.run(task="force", recordings=tactbench.open_recordings(folder)[1:]), "of one folder"),
         (lambda folder: tactbench.results(folder / "nothing"), "no results"),
     ],
 )

@@ -1,1 +1,1 @@
-"""The frame: it never names a sensor, a task or a rig, and reaches all of them by entry points."""
+"""Core of tactbench, which contains no sensor, task or rig by name, and finds them all by entry points."""

@@ -1,4 +1,4 @@
-"""Acquisition of one scene on one rig into one recording."""
+"""Acquisition of one scene on one rig, written to one recording."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def acquire(
     watch: Callable[[Block], None] | None = None,
     complete_interrupted: bool = False,
 ) -> RecordingMeta:
-    """Carry out a scene, write the samples to a file, and return the meta of the recording.
+    """Carry out a scene, write its samples to a file, and return the metadata of the recording.
 
-    A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
+    A recording of devices that ended early, or that lacks more rows than the rig file allows, is kept as an
     incomplete one: `excluded` is ``incomplete: `` and the reason.
 
     Parameters
@@ -38,7 +38,7 @@ def acquire(
     rig
         The rig of `request.rig`. The counts of an acquisition of devices (DeviceAcquisition) are recorded too. An
         acquisition with parts that move has ``stop(why)``, which is called before an interrupted recording is
-        completed: it stops them at once, and returns what remains to be done by hand, or an empty text.
+        completed: it stops the parts, and returns a text about any work left for the operator.
     clock
         Monotonic clock [s]; its difference over the scene, without writing the file, is ``provenance["sim_s"]`` of a
         simulated rig and ``provenance["acquisition_s"]`` of others.
@@ -54,7 +54,7 @@ def acquire(
     Raises
     ------
     RigError, NotApplicable, LinkError
-        If the rig cannot carry out the scene, a device sent nothing in all of it, or what moves cannot be stopped.
+        If the rig cannot carry out the scene, a device sent no row, or moving parts cannot be stopped.
     KeyboardInterrupt
         If it was interrupted.
     RecordingError
@@ -77,7 +77,7 @@ def acquire(
         began_s = time.perf_counter()
 
         def conclude(reason: str) -> None:
-            """Write the facts that are known at the end, with the reason for its exclusion, if there is one."""
+            """Write the facts that are known at the end of the scene, with the reason for exclusion, if any."""
             factor = whole.seconds / (time.perf_counter() - began_s)
             drawn = dict(acquisition.drawn)
             remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
@@ -119,7 +119,7 @@ def acquire(
                             writer.complete()
                 if alarm:
                     raise RigError(
-                        f"It was interrupted ({_reason_of(error)}), and the rig is not as it should be: {alarm}."
+                        f"The scene was interrupted ({_reason_of(error)}), and the rig is not in a safe state: {alarm}."
                     ) from error
                 raise
             alarm = _stop(acquisition, RigError(lacking)) if lacking else ""
@@ -127,37 +127,37 @@ def acquire(
                 with suppress(RecordingError):
                     conclude(INCOMPLETE + lacking)
                     writer.complete()
-                raise RigError(f"The scene {request.scene.name!r} ended, and the rig is not as it should be: {alarm}.")
+                raise RigError(f"The scene {request.scene.name!r} ended, but the rig is not in a safe state: {alarm}.")
             conclude(lacking and INCOMPLETE + lacking)
     return writer.meta
 
 
 def _incompleteness(acquisition: Any, whole: Completeness) -> str:
-    """Return the reason for which a recording of devices is incomplete; empty: it is complete."""
+    """Return the reason why a recording of devices is incomplete; an empty text if it is complete."""
     ended = str(getattr(acquisition, "ended", ""))
     found = [f"ended before its time: {ended}"] if ended else []
     return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
-    """Raise RigError if no row came from the sensor or none from the reference."""
+    """Raise RigError if no row came from the sensor, or no row from the reference."""
     for streams in (acquisition.streams, acquisition.reference):
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):
             raise RigError(
-                f"No row came from {', '.join(names)} in the whole scene.",
-                hint="Is the device on, connected and set to the same speed? `tactbench doctor` tests it.",
+                f"No row came from {', '.join(names)} during the whole scene.",
+                hint="Check power, cable and speed of the device; `tactbench doctor` tests its link.",
             )
 
 
 def _one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which a simulation makes the same bytes for any number of threads of BLAS."""
+    """Return a context in which a simulation gives identical bytes for any number of BLAS threads."""
     importlib.import_module("scipy.linalg")  # its own BLAS can be limited once it is loaded
     return thread_limit(1)
 
 
 def _stop(acquisition: Acquisition, error: BaseException) -> str:
-    """Stop all motion before anything is written; return what remains to be done by hand where that fails."""
+    """Stop all motion before a file is written; return the work left for the operator, empty if all stopped."""
     stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
     return "" if stop is None else stop(_reason_of(error))
 
@@ -167,7 +167,7 @@ def _reason_of(error: BaseException) -> str:
 
 
 def _with_written(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
-    """Return counts with the written rows; rows in transit when the recording was cut short count as dropped."""
+    """Return row counts with the written rows; rows in transit when the recording was cut short count as dropped."""
     left = max(0, counts.received - written - counts.dropped - counts.duplicates - counts.late) if cut_short else 0
     return counts.model_copy(update={"written": written, "dropped": counts.dropped + left})
 
@@ -180,7 +180,7 @@ def _of_devices(
     cut_short: bool = False,
     factor: float | None = None,
 ) -> dict[str, Any]:
-    """Return the fields of the meta that an acquisition of devices knows, and the clock of any acquisition."""
+    """Return the metadata that only an acquisition of devices has, and the clock of any acquisition."""
     emulation = _emulation(request.rig_file, request.sensor.name, acquisition, factor)
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
     simulated = request.rig.simulated or (emulation is not None and emulation.time == "virtual")
@@ -194,12 +194,12 @@ def _of_devices(
 
 
 def _is_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
-    """Return whether a device states in its facts that it is emulated, which a rig file may leave out."""
+    """Return True if a device states in its facts that it is emulated, which a rig file may omit."""
     return any(key.startswith(f"{name} ") and "emulat" in str(value).lower() for key, value in drawn.items())
 
 
 def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
-    """Return how devices were emulated, by the rig file and by their own facts; None: none was."""
+    """Return how devices were emulated, from the rig file and from the devices' own facts; None: no device was."""
     names = [] if file is None else [
         name
         for name, entry in file.entries().items()

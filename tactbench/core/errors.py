@@ -1,4 +1,4 @@
-"""Errors that tactbench raises on purpose.
+"""Errors that tactbench raises for invalid input, data or plugins.
 
 ::
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class TactbenchError(Exception):
-    """Root of all errors of tactbench: a message of what was given and expected, and a hint at the next step."""
+    """Root of all errors of tactbench: a message of what was given and expected, and a hint for the next step."""
 
     exit_code = 1
     traceback_text = ""
@@ -54,18 +54,18 @@ def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchEr
 
 
 def error_text(error: BaseException) -> str:
-    """Return the message of an error, behind its class where that is not one of tactbench's."""
+    """Return the message of an error, preceded by the name of its class if the class is not part of tactbench."""
     return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 class UsageError(TactbenchError):
-    """A command or a call cannot be carried out as it is given: exit code 2."""
+    """A command or a call has invalid arguments or settings: exit code 2."""
 
     exit_code = 2
 
 
 def nearest(given: str, known: Iterable[str]) -> list[str]:
-    """Return the names of `known` that look like `given`, best first."""
+    """Return the names of `known` that are similar to `given`, the most similar first."""
     names = sorted(known)
     folded = {name.casefold(): name for name in names}
     close = difflib.get_close_matches(given.casefold(), list(folded), n=3, cutoff=0.5)
@@ -73,13 +73,13 @@ def nearest(given: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """Return ``Did you mean …? `` for the names of `known` that look like `given`; empty if none does."""
+    """Return ``Did you mean …? `` with the names of `known` that are similar to `given`; empty if no name is."""
     close = " or ".join(map(repr, nearest(given, known)))
     return f"Did you mean {close}? " if close else ""
 
 
 def complaint(error: ValidationError) -> str:
-    """Return the first complaint of pydantic as ``place: message (given: value)``."""
+    """Return the first complaint of a pydantic error as ``place: message (given: value)``."""
     first = error.errors(include_url=False)[0]
     place, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
@@ -87,14 +87,14 @@ def complaint(error: ValidationError) -> str:
 
 
 def wrong(argument: str, given: object, takes: str) -> UsageError:
-    """Return the error of a function in Python for a value that its argument does not take."""
+    """Return the error for an invalid value of an argument of a Python function."""
     shown = repr(given) if isinstance(given, str | type) else reprlib.repr(given)
     shown += f" of shape {given.shape}" if hasattr(given, "shape") else ""
-    return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
+    return UsageError(f"{argument}={shown} is not valid.", hint=f"`{argument}` must be {takes}.")
 
 
 class UnknownNameError(UsageError):
-    """There is no sensor, rig, task … with a given name; the hint has the nearest names."""
+    """No sensor, rig, task … has the given name; the hint has the most similar names."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
@@ -103,7 +103,7 @@ class UnknownNameError(UsageError):
 
 
 class ConfigError(UsageError):
-    """A YAML file is not valid; the message begins with file and line."""
+    """A YAML file is not valid; the message begins with the file and the line."""
 
     def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
         where = f"{file}:{line}" if line else file
@@ -111,28 +111,28 @@ class ConfigError(UsageError):
 
 
 class FolderError(UsageError):
-    """A result folder cannot be read or written, is held by another run, or contradicts another one."""
+    """A result folder cannot be read or written, is in use by another run, or contradicts another folder."""
 
 
 class PluginError(TactbenchError):
-    """A plugin cannot be used."""
+    """A plugin cannot be loaded or used."""
 
 
 class DuplicateNameError(PluginError):
-    """Two distributions give one name to two things of one kind."""
+    """Two distributions define a sensor, task … of the same name."""
 
     exit_code = 2
 
     def __init__(self, kind: str, name: str, distributions: Sequence[str]) -> None:
         both = " and ".join(distributions)
         super().__init__(
-            f"The {kind} {name!r} is defined by {both}; neither is used.",
-            hint="Uninstall one of them, or ask its author to rename it.",
+            f"The {kind} {name!r} is defined by {both}; neither definition is used.",
+            hint="Uninstall one of the distributions, or ask its author to rename the {kind}.",
         )
 
 
 class PluginContractError(PluginError):
-    """A plugin does not keep the interface it promised."""
+    """A plugin violates the interface that its hooks require."""
 
 
 class RecordingError(TactbenchError):
@@ -140,31 +140,31 @@ class RecordingError(TactbenchError):
 
 
 class FormatError(RecordingError, ValueError):
-    """Not a tactbench recording, or a damaged one."""
+    """The file is not a recording of tactbench, or is damaged."""
 
     exit_code = 2
 
 
 class MissingRecordingError(RecordingError, FileNotFoundError):
-    """There is no such recording."""
+    """No recording is found at the given place."""
 
     exit_code = 2
 
 
 class UnwritableError(RecordingError):
-    """The folder or disk of a recording refuses it."""
+    """The folder or disk does not allow a recording to be written."""
 
     exit_code = 2
 
 
 class MappingError(RecordingError, ValueError):
-    """A foreign table does not fit its mapping."""
+    """A table of another source does not match its mapping."""
 
     exit_code = 2
 
 
 class RigError(TactbenchError):
-    """A rig cannot carry out a scene."""
+    """A rig cannot be built, or cannot carry out a scene."""
 
 
 class LinkError(TactbenchError):
@@ -172,44 +172,44 @@ class LinkError(TactbenchError):
 
 
 class LinkClosed(LinkError):  # noqa: N818  (names what happened to the link, as its siblings do)
-    """The link was closed."""
+    """The link was closed before the operation."""
 
 
 class LinkTimeout(LinkError):  # noqa: N818
-    """Nothing came, or nothing could be sent, within the time given; the link may be used on."""
+    """No data were received, or could be sent, within the given time; the link remains usable."""
 
 
 class LinkUnplugged(LinkError):  # noqa: N818
-    """The device, its cable or the other end is gone; only closing is left."""
+    """The device, its cable or the other end has disappeared; the link can only be closed."""
 
 
 class DataError(TactbenchError, ValueError):
-    """Recordings cannot be turned into X and y."""
+    """Recordings cannot be converted to features X and targets y."""
 
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
-    """The cell does not apply: its row is ``skipped`` with this reason."""
+    """The cell does not apply to its data: its row is ``skipped``, with this reason."""
 
 
 class EngineError(TactbenchError):
-    """The engine that computes cells is gone, or has other versions than this process."""
+    """The engine that computes cells has ended, or has other package versions than this process."""
 
 
 class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
-    """A cell or a recording ended without a result.
+    """A cell or a recording was stopped without a result.
 
     Parameters
     ----------
     message, hint, traceback_text
-        As of every error.
+        Message, hint and traceback, as in every error of tactbench.
     signal
-        Number of the signal that ended its process; None: no signal did.
+        Number of the signal that ended the process; None: the process was not ended by a signal.
     log
-        The end of its output.
+        The last part of the output of the process.
     """
 
     spent_s: float | None = None
-    """Time until it ended [s]; None: not known."""
+    """Time until the cell or recording was stopped [s]; None: not known."""
     status: Literal["failed", "crashed", "timeout", "out-of-memory"] = "crashed"
 
     def __init__(
@@ -222,24 +222,24 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
 
 
 class Raised(CellStopped):
-    """An error of another package was raised in another process; the message names its type."""
+    """An error of another package was raised in another process; the message contains its type."""
 
     status = "failed"
 
 
 class Crashed(CellStopped):
-    """Its process was ended by a signal, or ended itself."""
+    """The process of a cell or a recording was ended by a signal, or exited by itself."""
 
     status = "crashed"
 
 
 class TimedOut(CellStopped):
-    """It took longer than it may."""
+    """A cell or a recording took longer than its time limit."""
 
     status = "timeout"
 
 
 class OutOfMemory(CellStopped):
-    """It took more memory than it may, or than there is."""
+    """A cell or a recording used more memory than its limit, or than is available."""
 
     status = "out-of-memory"

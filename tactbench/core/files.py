@@ -1,4 +1,4 @@
-"""Writing of whole files, locks, and texts that are not UTF-8."""
+"""Writing of whole files, locking of files, and texts that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from tactbench.core.errors import UnwritableError
 
 
 def utf8_json(text: str) -> str:
-    r"""Return JSON whose texts have their lone surrogates escaped: a byte of a file name becomes ``\\udce9``."""
+    r"""Return JSON with the lone surrogates in its texts escaped: an odd byte in a file name becomes ``\\udce9``."""
     return re.sub("[\ud800-\udfff]", lambda found: rf"\\u{ord(found[0]):04x}", text)
 
 
 def named_file(text: str) -> Path:
-    """Return the path of a file whose name :func:`utf8_json` may have escaped."""
+    """Return the path of a file whose name may have been escaped by :func:`utf8_json`."""
     return Path(re.sub(r"\\u(dc[89a-f][0-9a-f])", lambda found: chr(int(found[1], 16)), text))
 
 
 def try_lock(file: int) -> bool | None:
-    """Lock an open file for this process (flock(2)) until it is closed or the process ends.
+    """Lock an open file for this process (flock(2)) until the file is closed or the process ends.
 
-    Return False if another process has the lock; None where there are no locks: on Windows, on some network disks.
+    Return False if another process has the lock; None where locks are not supported: Windows, some network disks.
     """
     try:
         import fcntl
@@ -40,10 +40,10 @@ def try_lock(file: int) -> bool | None:
 
 
 def hdf5_image(fill: Callable[[Any], None]) -> bytes:
-    """Return the bytes of an HDF5 file that is built in memory by `fill`, which is called with the open ``h5py.File``.
+    """Return the bytes of an HDF5 file that `fill`, called with the open ``h5py.File``, writes in memory.
 
-    The HDF5 library cannot close a file on a full disk, and crashes the process when Python raises in a file object
-    that it writes through, as Ctrl-C does. The file has the oldest format of HDF5, which every reader opens.
+    The HDF5 library cannot close a file on a full disk, and crashes the process if Python raises an error in a file
+    to which it writes, as on Ctrl-C. The file has the oldest format of HDF5, which every reader opens.
     """
     import h5py
 
@@ -56,9 +56,9 @@ def hdf5_image(fill: Callable[[Any], None]) -> bytes:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
+    """Write `content` to a temporary file, sync it and rename it to `path`: readers see either the old or the new file.
 
-    Raises OSError if the folder cannot be written; no partial file is left then.
+    Raises OSError if the folder cannot be written; in this case, no partial file remains.
     """
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
@@ -74,11 +74,11 @@ def replace_file(path: Path, content: bytes) -> None:
 
 @contextmanager
 def writable(place: Path) -> Iterator[None]:
-    """Return a context that turns errors of the system while `place` is written into UnwritableError."""
+    """Return a context in which system errors while `place` is written are converted to UnwritableError."""
     try:
         yield
     except OSError as error:
         raise UnwritableError(
             f"{place} cannot be written: {error.strerror or error}.",
-            hint="Check the folder's permissions and the free space, or give another with --out.",
+            hint="Check the folder's permissions and the free space, or give another folder with --out.",
         ) from error

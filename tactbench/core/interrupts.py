@@ -15,17 +15,17 @@ from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 ONE_S = 1.0
-"""Seconds within which signals count as one, as a closed terminal and a batch system send several."""
+"""Time within which repeated signals count as one [s], as a closed terminal or a batch system sends several."""
 
 _raised_s = -ONE_S
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal, with its number; after a plain KeyboardInterrupt, Python may end by SIGINT."""
+    """An interrupt by a signal, with its number; after a plain KeyboardInterrupt, Python may end by SIGINT."""
 
 
 def interrupt(number: int, _frame: FrameType | None) -> None:
-    """Raise Interrupted; handles SIGTERM and SIGHUP."""
+    """Raise Interrupted, as the handler of SIGTERM and SIGHUP."""
     global _raised_s
     if time.monotonic() - _raised_s >= ONE_S:
         _raised_s = time.monotonic()
@@ -33,7 +33,7 @@ def interrupt(number: int, _frame: FrameType | None) -> None:
 
 
 def end_alike() -> None:
-    """Make SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; a signal that is ignored (``nohup``) stays so."""
+    """Make SIGTERM and SIGHUP raise KeyboardInterrupt, as Ctrl-C does; an ignored signal (``nohup``) stays ignored."""
     for number in _handled(signal.SIG_DFL):
         signal.signal(number, interrupt)
     for number in ENDING:  # what is removed when Python ends is removed whole
@@ -42,7 +42,7 @@ def end_alike() -> None:
 
 
 def _send_again(dropped: Any) -> None:
-    """Send a signal again whose exception Python has dropped: in a weak reference's callback, in ``__del__``."""
+    """Send a signal again if Python dropped its exception, as in a weak reference's callback or in ``__del__``."""
     global _raised_s
     if isinstance(dropped.exc_value, KeyboardInterrupt):
         _raised_s = -ONE_S
@@ -54,9 +54,9 @@ def _send_again(dropped: Any) -> None:
 
 @contextmanager
 def one_interrupt() -> Iterator[Callable[[], None]]:
-    """Return a context in which the first signal raises KeyboardInterrupt and further ones are ignored.
+    """Return a context in which the first signal raises KeyboardInterrupt and later signals are ignored.
 
-    It yields a function that ignores all signals from then on. Other threads and own handlers are not affected.
+    It yields a function that makes all later signals ignored. Other threads and other handlers are not affected.
     """
 
     def ignore() -> None:
@@ -73,7 +73,7 @@ def one_interrupt() -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Return a context that delays signals to its end, where the first of them takes effect."""
+    """Return a context that delays signals until its end, where the first delayed signal takes effect."""
     came: list[int] = []
     with _handling(lambda number, _frame: came.append(number)) as before:
         yield
@@ -94,7 +94,7 @@ def _handling(handler: Callable[[int, FrameType | None], None]) -> Iterator[dict
 
 
 def _handled(*by: Any) -> dict[int, Any]:
-    """Return the signals with one of these handlers, and their handlers; outside the main thread there are none."""
+    """Return the signals that have one of the given handlers, with the handler; empty outside the main thread."""
     if threading.current_thread() is not threading.main_thread():
         return {}
     return {number: handler for number in ENDING if (handler := signal.getsignal(number)) in by}

@@ -1,4 +1,4 @@
-"""Imports at first use: names of a module, and contributions of other rooms to the core."""
+"""Imports at first use: names of a module, and additions of other packages of tactbench to the core."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from typing import Any
 def on_demand(door: str) -> Callable[[str], Any]:
     """Return a ``__getattr__`` for module `door` that imports, at first use, its names under ``if TYPE_CHECKING``.
 
-    A listing of plugins, or a command that shows its help, then imports neither numpy nor links.
+    With it, a listing of plugins or a command that shows its help imports neither numpy nor links.
     """
 
     def imported(name: str) -> Any:
@@ -26,7 +26,7 @@ def on_demand(door: str) -> Callable[[str], Any]:
 
 @cache
 def _modules(door: str) -> Mapping[str, str]:
-    """Return the modules of the names that a door imports under a condition."""
+    """Return the module of each name that a module's source imports under a condition."""
     import ast
 
     tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
@@ -36,7 +36,7 @@ def _modules(door: str) -> Mapping[str, str]:
 
 
 def contributed(group: str) -> Mapping[str, Any]:
-    """Return the contributions of other rooms to the core, by name: the entry points of tactbench."""
+    """Return the additions of other packages of tactbench to the core, by name, from entry points."""
     from importlib.metadata import distribution
 
     return {point.name: point for point in sorted(distribution("tactbench").entry_points.select(group=group))}

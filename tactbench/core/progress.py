@@ -1,4 +1,4 @@
-"""Interface for the progress of a long run, which `tactbench.core.study.progress` shows."""
+"""Interface for the progress of a long run, implemented by `tactbench.core.study.progress`."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from contextlib import AbstractContextManager, nullcontext
 
 
 class Progress:
-    """Receiver of the progress of a run, which shows nothing; subclasses do."""
+    """Receiver of the progress of a run; this base class shows nothing, its subclasses do."""
 
     def begin(self, stage: str, total: int) -> None:
-        """Start a stage of `total` steps."""
+        """Start a stage that has `total` steps."""
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Finish one step, named `what`; `stopped` states that it has failed."""
+        """Finish one step, named `what`; `stopped` is true if the step failed."""
 
     def working(self, what: str) -> None:
-        """Show what is being done now, without finishing a step."""
+        """Show the current activity, without finishing a step."""
 
     def paused(self) -> AbstractContextManager[None]:
-        """Return a context in which nothing is drawn, for a prompt."""
+        """Return a context in which no progress is drawn, for a prompt to the user."""
         return nullcontext()

@@ -1,4 +1,4 @@
-"""Limits on the number of threads of numerical libraries, which are cheap to set for every cell."""
+"""Limits on the number of threads of numerical libraries, cheap enough to be set for every cell."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Any
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables that numerical libraries read when they are loaded."""
+"""Environment variables that numerical libraries read when they are loaded, by name."""
 
 
 def keep_threads() -> None:
-    """Limit numerical libraries to one thread, as the table's times state; to be called before one is loaded.
+    """Limit numerical libraries to one thread, as the published times assume; to be called before a library is loaded.
 
-    Several threads would also sum in another order on another machine. Variables that are set already are kept.
+    With several threads, sums would depend on the machine. Environment variables that are already set are kept.
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
@@ -28,8 +28,8 @@ def keep_threads() -> None:
 def thread_limit(threads: int) -> AbstractContextManager[Any]:
     """Return a context in which OpenMP and BLAS use at most `threads` threads.
 
-    Finding the loaded libraries takes threadpoolctl about 2 ms, setting their threads some microseconds; they are
-    looked for again after further imports.
+    Finding the loaded libraries takes threadpoolctl about 2 ms, setting their threads a few microseconds; libraries are
+    searched again after further imports.
     """
     limit: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=threads)
     return limit
@@ -37,5 +37,5 @@ def thread_limit(threads: int) -> AbstractContextManager[Any]:
 
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> Any:
-    """Return the numerical libraries of this process when it had imported so many modules."""
+    """Return the loaded numerical libraries; `modules`, the number of imported modules, is the key of a cache."""
     return importlib.import_module("threadpoolctl").ThreadpoolController()

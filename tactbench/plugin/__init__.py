@@ -1,8 +1,8 @@
-"""The door: what an author of a sensor, a task, an estimator or a rig imports.
+"""Public interface for authors of plugins: sensors, tasks, estimators, rigs and more.
 
 A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 2`` and implements
-one or more of the hooks; ``docs/plugins.md`` shows how. What being simulated takes is in
-:mod:`tactbench.plugin.simulation`; drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
+one or more of the hooks; ``docs/plugins.md`` shows how. Names for simulated sensors are in
+:mod:`tactbench.plugin.simulation`; names for drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
 """
 
 from tactbench.core.errors import (

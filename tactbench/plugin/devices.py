@@ -1,6 +1,6 @@
-"""The door to devices: drivers, emulators, links, rig files, and the rigs that use them.
+"""Public interface for devices: drivers, emulators, links, rig files, and the rigs that use them.
 
-``docs/hardware.md`` shows a driver, ``docs/links.md`` its links, ``docs/emulation.md`` emulated devices.
+``docs/hardware.md`` explains drivers, ``docs/links.md`` links, ``docs/emulation.md`` emulated devices.
 """
 
 from typing import TYPE_CHECKING

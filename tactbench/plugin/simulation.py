@@ -1,6 +1,6 @@
-"""The door to simulation: what a sensor declares to be simulated, and what a simulated rig is made of.
+"""Public interface for simulation: declarations of simulated sensors, and parts of simulated rigs.
 
-Skins, nuisances, transducers and skin states; effects, known answers of a simulation, and what its accuracy costs.
+Skins, nuisances, transducers and skin states; effects, comparisons with exact solutions, and computing times.
 """
 
 from tactbench.core.plugins.interfaces import (

@@ -1,1 +1,1 @@
-"""The checks that a plugin must pass: ``tactbench check`` runs them, :mod:`tactbench.testing` hands them out."""
+"""Checks that a plugin must pass: ``tactbench check`` and :mod:`tactbench.testing` run them."""

@@ -1,4 +1,4 @@
-"""Checks, their subjects and outcomes, and the checks of every plugin."""
+"""Definition of checks, of the plugins they check and of outcomes, and the checks that apply to every plugin."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from tactbench.core.plugins.registry import Registry, ask_plugin, line_in, load_
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
 EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
 KINDS = EVERY_KIND[:-1]
-"""Kinds of descriptors; a data set is a file."""
+"""Kinds of descriptors that can be checked, and `dataset` for a mapping file."""
 Mode = Literal["passive", "invasive", "recording"]
-"""`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
-a recording is read."""
+"""Modes of checks. `passive`: no device is opened and nothing moves. `invasive`: a device is opened, or a rig presses.
+`recording`: only a recording is read."""
 HEAVY = frozenset({
     "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
 })  # fmt: skip
-"""Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
+"""Packages that take tenths of a second to import, or that may be absent where plugins are listed."""
 
 
 THREAD_S = 1.0  # time for a thread to end
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
-    """A plugin fails a check.
+    """Raised when a plugin fails a check.
 
     Parameters
     ----------
@@ -61,27 +61,27 @@ class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
 
 
 class CheckSkipped(Exception):  # noqa: N818  (a result, not a failure)
-    """A plugin lacks what a check is about, and may: the message says what."""
+    """Raised when a plugin lacks, legitimately, the subject of a check; the message names what is absent."""
 
 
 class CheckOutcome(NamedTuple):
-    """Outcome of a check."""
+    """Outcome of one check of one plugin."""
 
     check: str
     status: Literal["passed", "failed", "skipped"]
     where: str = ""
-    """The field or line at fault."""
+    """Field or line at fault."""
     text: str = ""
-    """The mistake, or the reason for which it was skipped."""
+    """The mistake that was found, or the reason for skipping the check."""
     advice: str = ""
-    """Advice; empty where the plugin's code raised, since `where` and `text` are then all that is known."""
+    """Advice for a failure; empty if the plugin's code raised an error, as only `where` and `text` are then known."""
     seconds: float | None = None
-    """Duration; None for a check that was stopped or not tried."""
+    """Duration of the check [s]; None: it was stopped or not tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A plugin's sensor, rig, device … under check, with the registry of all plugins."""
+    """A plugin's sensor, rig, device … to be checked, with the registry of all plugins."""
 
     kind: Kind
     name: str
@@ -90,62 +90,62 @@ class Subject:
     distribution: str
     registry: Registry
     recording: Path | None = None
-    """Recording that is read in the mode `recording`."""
+    """Recording to be read in the mode `recording`."""
     rig_file: Path | None = None
-    """Rig file of the devices that are opened in the mode `invasive`."""
+    """Rig file of the devices to be opened in the mode `invasive`."""
     operator: Operator | None = None
-    """Operator of the rig in the mode `invasive`."""
+    """The person who operates the rig in the mode `invasive`."""
     root: Path | None = None
-    """A folder that holds the files of a data set."""
+    """Folder that contains the files of a data set."""
 
     @cached_property
     def descriptor(self) -> Any:
-        """Descriptor that the plugin's hook gives in this process; CheckFailed if it does not."""
+        """Descriptor from the plugin's hook, read anew in this process; raises CheckFailed if it is absent."""
         try:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
             return next(one for one in offered if one.name == self.name)
         except (PluginError, KeyError, StopIteration) as error:
-            raise CheckFailed(self.module, f"its hook does not give {self.name!r} again: {error}") from error
+            raise CheckFailed(self.module, f"the hook does not give {self.name!r} again: {error}") from error
 
     @property
     def spec(self) -> Any:
-        """The spec of a sensor or task; of others the descriptor."""
+        """The specification of a sensor or task; for other kinds the descriptor."""
         return getattr(self.descriptor, "spec", self.descriptor)
 
     @property
     def package(self) -> str:
-        """The top of the plugin's module names."""
+        """First part of the name of the plugin's module."""
         return self.module.partition(".")[0]
 
     def code(self, field: str) -> Any:
-        """Return the object that a field of the descriptor or the spec names, imported."""
+        """Import and return the object to which a field of the descriptor or the spec refers."""
         return load_object(getattr(self.descriptor, field, None) or getattr(self.spec, field))
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check of some kinds of plugins."""
+    """A check that applies to some kinds of plugins."""
 
     name: str
-    """Lower case with hyphens; unique among the checks of a kind."""
+    """Name of the check in lower case with hyphens; unique among the checks of a kind."""
     kinds: tuple[Kind, ...]
     mode: Mode
     why: str
-    """The mistake that it finds, in one sentence."""
+    """The mistake that the check finds, in one sentence."""
     cure: str
-    """Advice when it fails, in one sentence."""
+    """Advice for plugins that fail the check, in one sentence."""
     needs: tuple[str, ...]
-    """Names of checks that must have passed; otherwise it is skipped."""
+    """Names of checks that must pass first; otherwise this check is skipped."""
     run: Callable[[Subject], None]
-    """Raises CheckFailed, or CheckSkipped."""
+    """Function that carries out the check; raises CheckFailed or CheckSkipped."""
 
 
 CHECKS: list[Check] = []
-"""All checks in the order in which they run, each after those that it needs."""
+"""All checks in the order in which they run, each check after those that it needs."""
 
 
 def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Callable[[Subject], None]], Check]:
-    """Make a check of a function, by its name; its docstring has `why` and, as a second paragraph, `cure`."""
+    """Make a check from a function and its name; its docstring is `why` and, as a second paragraph, `cure`."""
 
     def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
@@ -158,24 +158,24 @@ def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Ca
 
 
 def fail(where: str, text: str) -> NoReturn:
-    """Raise CheckFailed."""
+    """Raise CheckFailed with the field or line at fault and the mistake."""
     raise CheckFailed(where, text)
 
 
 def skip(text: str) -> NoReturn:
-    """Raise CheckSkipped."""
+    """Raise CheckSkipped with the reason for skipping."""
     raise CheckSkipped(text)
 
 
 @contextmanager
 def code_of(field: str, subject: Subject) -> Iterator[None]:
-    """Turn whatever the plugin's code raises into a failure that names the field, the line and what was raised."""
+    """Convert any error from the plugin's code to a failure that names the field, the line and the error."""
     try:
         yield
     except (CheckFailed, CheckSkipped):
         raise
     except NotApplicable as reason:
-        raise CheckSkipped(f"it says: {reason.message}") from reason
+        raise CheckSkipped(f"not applicable: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, "".join(traceback.format_exception(error)))
         raise CheckFailed(f"{field}{line}", error_text(error)) from error
@@ -183,26 +183,26 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
 
 @check(*KINDS)
 def code_names_resolve(subject: Subject) -> None:
-    """Code is named by text and imported when it is needed, so that a slip of the pen shows in the middle of a run.
+    """Import paths are text, used only when the code is needed, so that a misspelling shows in the middle of a run.
 
     Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
     """
     fields = [*subject.descriptor, *subject.spec]
     named = [name for name, value in fields if isinstance(value, str) and re.fullmatch(r"[\w.]+:[\w.]+", value)]
     if not named:
-        skip("its descriptor names no code")
+        skip("the descriptor has no import path of code")
     for field in named:
         with code_of(field, subject):
             subject.code(field)
 
 
 def _seeded(*_: Any) -> NoReturn:
-    raise PluginError("It seeds a global generator.", hint="Draw from a generator of your own.")
+    raise PluginError("A global random generator is seeded.", hint="Use a generator of your own.")
 
 
 @contextmanager
 def unchanged(subject: Subject) -> Iterator[None]:
-    """Fail where a plugin's code changes what it shares with all others, prints, or leaves a thread of a driver."""
+    """Fail if a plugin's code changes global state, prints, or leaves a driver's thread running."""
     before, threads = (np.geterr(), Path.cwd()), set(threading.enumerate())
     with (
         patch("numpy.random.seed", _seeded), patch("random.seed", _seeded),
@@ -210,9 +210,9 @@ def unchanged(subject: Subject) -> Iterator[None]:
     ):  # fmt: skip
         yield
         if (np.geterr(), Path.cwd()) != before:
-            fail(subject.package, "its code changes numpy's treatment of errors, or the current folder")
+            fail(subject.package, "the code changes numpy's treatment of errors, or the current folder")
     if printed.getvalue():
-        fail(subject.package, f"its code prints {printed.getvalue()[:40]!r}: results of commands go to stdout")
+        fail(subject.package, f"the code prints {printed.getvalue()[:40]!r}: stdout is for results of commands")
     for thread in set(threading.enumerate()) - threads if subject.kind in ("sensor", "device") else ():
         thread.join(THREAD_S)
         if thread.is_alive():
@@ -221,19 +221,19 @@ def unchanged(subject: Subject) -> Iterator[None]:
 
 @check(*KINDS)
 def import_is_light(subject: Subject) -> None:
-    """The module of an entry point is imported by every command, also by one that only lists names.
+    """Every command imports the modules of all entry points, including commands that only list names.
 
-    Move imports of large packages into the module that the descriptor names, or into functions; compute and read
-    nothing there.
+    Move imports of large packages into the module to which the descriptor refers, or into functions; compute and read
+    nothing at import.
     """
     heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
     if heavy:
-        fail(subject.module, f"its import also imports {', '.join(heavy)}")
+        fail(subject.module, f"importing this module also imports {', '.join(heavy)}")
 
 
 @lru_cache(maxsize=64)
 def _imported_with(module: str) -> list[str]:
-    """Return the modules of a fresh interpreter that has imported a module, without those of tactbench's own door."""
+    """Return the modules that importing `module` loads in a new interpreter, without those of tactbench's own."""
     path = os.pathsep.join(part for part in sys.path if part)
     code = f"import sys, tactbench.plugin.devices; a = {{*sys.modules}}; import {module}; print(*{{*sys.modules}} - a)"
     done = subprocess.run(
@@ -241,5 +241,5 @@ def _imported_with(module: str) -> list[str]:
         capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
     )  # fmt: skip
     if done.returncode != 0:
-        fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")
+        fail(module, f"no new interpreter can import the module: {done.stderr.strip().rpartition(chr(10))[2]}")
     return done.stdout.split()

@@ -1,4 +1,4 @@
-"""Checks of an estimator, on a made-up question with a known answer."""
+"""Checks of an estimator, on synthetic data for which the answers are known."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAME_ROW = 1e-6  # relative difference between a row by itself and among others:
 
 
 def question(kind: str) -> list[Any]:
-    """Return X, y, new X and new y, read-only: y is linear in some features, in the last most; one is constant."""
+    """Return read-only X, y, new X and new y: y is linear in some features, most in the last; one is constant."""
     rng = np.random.default_rng(0)
     X = rng.normal(size=(ROWS + NEW_ROWS, FEATURES))
     y = LEVEL + X @ np.array([0.5, 0.0, 0.0, 0.0, 0.0, -1.0, 2.0]) + 0.2 * rng.normal(size=len(X))
@@ -34,7 +34,7 @@ def question(kind: str) -> list[Any]:
 
 
 def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *, given: Any = None) -> Answer:
-    """Fit as an evaluation does, by default with the parameters of the rehearsal; return its checked `predict`."""
+    """Fit as an evaluation does, with the rehearsal's parameters by default; return a checked `predict`."""
     from tactbench.core.evaluation.fitting import answers, fit
 
     X, y, *_ = given or question(kind)
@@ -53,7 +53,7 @@ def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *,
 
 @check("estimator", needs="code-names-resolve")
 def answers_have_the_shape(subject: Subject) -> None:
-    """Each row gets one finite answer, also where a column is constant, and no array is changed: others use it as well.
+    """Each row must get one finite answer, even if a column is constant, and no array may change, as others use it too.
 
     Return an array of shape (n,) from predict: numbers, or the classes of y; leave a constant column out, or divide by
     1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y. Give candidates of the type that a parameter needs:
@@ -71,7 +71,7 @@ def answers_have_the_shape(subject: Subject) -> None:
 
 @check("estimator", needs="answers-have-the-shape")
 def seed_and_data_decide(subject: Subject) -> None:
-    """All chance comes from the seed, folds must not know of each other, and rows come one by one in use.
+    """Randomness must come from the seed only, folds must be independent, and in use, rows arrive one by one.
 
     Pass `seed` on as random_state, return a new object from each call of the factory, and let fit() begin anew. Take
     means, scales and neighbours from fit(), never from the X of predict().
@@ -83,20 +83,20 @@ def seed_and_data_decide(subject: Subject) -> None:
         one_by_one = np.concatenate([answer(new[place : place + 1]) for place in range(5)])
         drawn = subject.descriptor.looks_at == "nothing"
         if not drawn and not np.allclose(one_by_one, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
-            fail("predict", "a row by itself gets another answer than among others")
+            fail("predict", "the answer to a single row differs from its answer among other rows")
         _taught(subject, kind, given=(-X, y[::-1].copy()))
         if not np.array_equal(_taught(subject, kind)(new), together):
-            fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
+            fail("where: argument seed", f"two {kind} models with the same seed and data answer differently")
 
 
 @check("estimator", needs="seed-and-data-decide")
 def it_learns(subject: Subject) -> None:
-    """Features answer a linear question: what is no better than the mean mixes rows, columns or signs up.
+    """A linear question must be answered better than by the mean; otherwise rows, columns or signs are mixed up.
 
-    Look at the order of rows, at scaling and at signs; set baseline=True where a trivial answer is meant.
+    Check the order of rows, scaling and signs; set baseline=True where a trivial answer is meant.
     """
     if subject.descriptor.baseline or subject.descriptor.looks_at != "features":
-        skip("it is a trivial answer by its own account")
+        skip("the estimator is declared as a baseline")
     for kind in subject.descriptor.kinds:
         _, y, new, truth = question(kind)
         given = _taught(subject, kind, {})(new)
@@ -104,5 +104,5 @@ def it_learns(subject: Subject) -> None:
             given = given > np.median(given)
         error, bar = (float(np.abs(one - truth).mean()) for one in (given, np.median(y)))
         if not error < BETTER * bar or (kind == "regression" and np.array_equal(given, np.round(given))):
-            text = f"{kind}: its error is {error:.3g}, that of the trivial answer {bar:.3g}, or it rounds"
+            text = f"{kind}: the error is {error:.3g}, that of the mean {bar:.3g}; or answers are rounded"
             fail("predict", text)

@@ -1,4 +1,4 @@
-"""Checks of a small press on a simulated rig, recorded and read back, and of everything that takes part in it."""
+"""Checks that record a small press on a simulated rig and read it back, for every kind of plugin in it."""
 
 from __future__ import annotations
 
@@ -50,26 +50,26 @@ WHY = "a check of plugins"
 
 
 def slow_ramp(end_n: float, seconds: float, hold_s: float) -> ForceRamp:
-    """Return a press of a hundred samples."""
+    """Return a scene of a short press with about a hundred samples."""
     end, hold, duration = assumed(end_n, "N", WHY), assumed(hold_s, "s", WHY), assumed(seconds, "s", WHY)
     return ForceRamp(end=end, hold=hold, duration=duration, samples=100)
 
 
 def tiny_scene(end_n: float = FORCE_N, **changes: Any) -> Scene:
-    """Return a press of one second, by default to half a newton, with `changes` of a scene's fields."""
+    """Return a scene of a press of one second, by default to 0.5 N, with `changes` to the scene's fields."""
     environment = Environment(force_noise=assumed(NOISE_N, "N", WHY))
     scene = Scene(name="check", profile=slow_ramp(end_n, SECONDS, SECONDS / 5), environment=environment)
     return scene.model_copy(update=changes)
 
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
-    """Return the first simulated rig, built; rigs of this package come before others."""
+    """Return the first simulated rig, built; rigs of tactbench come first."""
     descriptor = subject.registry.rigs[subject.registry.first_rig("simulated")]
     return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
-    """Return sensors that can be simulated: those of this package, the cheapest first, then the plugin's own."""
+    """Return the sensors that can be simulated: those of tactbench, the cheapest first, then the plugin's."""
     able = [one for one in subject.registry.sensors.all_owned() if one.ours or one.distribution == subject.distribution
             if one.descriptor.spec.skin is not None and one.descriptor.transducer is not None]  # fmt: skip
     able.sort(key=lambda one: (not one.ours, math.prod(one.descriptor.spec.skin.sheet.cells)))  # type: ignore[union-attr]
@@ -77,17 +77,17 @@ def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
 
 
 def first_press(subject: Subject, scene: Scene, field: str) -> Recorded:  # noqa: RET503  (`skip` returns nothing)
-    """Return the recording of a scene on the first simulated sensor that is applicable; skip if there is none."""
+    """Return the recording of a scene on the first simulated sensor that is applicable; skip if none is."""
     rig, descriptor = simulated_rig(subject)
     for sensor in simulated_sensors(subject):
         with suppress(CheckSkipped), code_of(field, subject):
             return carried_out(rig, sensor, descriptor, scene)
-    skip("no sensor that can be simulated goes with it: it needs another rig, or recordings")
+    skip("no simulated sensor is applicable: another rig, or recordings, are needed")
 
 
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Recorded:
-    """Return a press of a sensor over its range on a simulated rig, or a tiny press by a rig."""
+    """Return a recorded press of a sensor over its range on a simulated rig, or of any sensor by a given rig."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
         stated = subject.spec.data_sheet.force_range
@@ -96,7 +96,7 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
-        skip("it moves something real, or replays: with `--rig-file FILE` other checks press with it")
+        skip("the rig moves real devices, or replays; give `--rig-file FILE` for checks that press")
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     with code_of(field, subject):
         if subject.kind == "rig":
@@ -107,11 +107,11 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
 
 @check("sensor", "rig", needs="transducer-reads rest-is-as-stated code-names-resolve")
 def press_is_recorded(subject: Subject) -> None:
-    """A recording has a column a channel, numbers within their limits, and times by which rows are put on one clock.
+    """A recording must have one column for each channel, numbers within limits, and times that align the streams' rows.
 
     Yield blocks of shape (n, channels) for streams that the acquisition names; count t_ns on in whole nanoseconds, and
     state the rate in samples a second. Clip to lower and upper, mark those samples as SATURATED, others that mean
-    nothing as MISSING, and look at the units of the sensitivity: a SkinState has N, mm and MPa. State sign = 1 where a
+    nothing as MISSING, and check the units of the sensitivity: a SkinState has N, mm and MPa. State sign = 1 where a
     reading rises under load, -1 where it falls, 0 where it does either.
     """
     made = pressed(subject)
@@ -123,7 +123,7 @@ def press_is_recorded(subject: Subject) -> None:
 
 
 def _follows_the_force(made: Recorded) -> None:
-    """Fail where no channel changes any more in the upper part of a press."""
+    """Fail if no channel changes any more in the upper part of a press."""
     pressing, force_n = pressing_force(made.came, made.meta.reference)
     rises = list[bool]()
     for spec in made.meta.sensor.streams:
@@ -143,10 +143,10 @@ def _follows_the_force(made: Recorded) -> None:
 
 @check("rig", needs="press-is-recorded")
 def force_and_seed_decide(subject: Subject) -> None:
-    """The recorded force is what estimators are taught, and replicates are drawn anew: the same seed gives the same.
+    """Estimators learn the recorded force, and replicates are drawn by seed: the same seed must give the same samples.
 
     Give a reference stream with a channel of kind "force", unit "N", called fz or normal, positive where it presses.
-    Draw from a generator that `open` makes of its `seed`, never from a global one.
+    Draw from a generator that `open` makes from its `seed`, never from a global generator.
     """
     made = pressed(subject)
     stream, force_n = pressing_force(made.came, made.meta.reference)
@@ -157,13 +157,13 @@ def force_and_seed_decide(subject: Subject) -> None:
 
 
 def same_again(where: str, one: Recorded, other: Recorded) -> None:
-    """Fail where two presses with one seed gave different samples."""
+    """Fail if two presses with the same seed gave different samples."""
     for name in differing(one.arrays, other.arrays):
-        fail(f"{where}: {name}", "a repetition with the same seed gives other samples: does it keep or draw anything?")
+        fail(f"{where}: {name}", "a repetition with the same seed gives other samples: is any state kept or drawn?")
 
 
 def _full_scene(sensors: Sequence[SensorDescriptor]) -> Scene:
-    """Return a press of a warm indenter under force control that slides: most effects change its readings."""
+    """Return a scene in which a warm indenter presses under force control and slides, so that most effects matter."""
     kinds = dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())
     scene = tiny_scene(EFFECT_N, observe=tuple(kinds), unit="2", drive=ForceLoop())
     warm = scene.environment.model_copy(update={"indenter_temperature": assumed(40.0, "degC", WHY)})
@@ -173,7 +173,7 @@ def _full_scene(sensors: Sequence[SensorDescriptor]) -> Scene:
 
 @check("effect", needs="code-names-resolve")
 def effect_takes_part(subject: Subject) -> None:
-    """A plan takes effects by the tokens that they produce and consume, and by what called_for answers.
+    """A plan includes effects by the tokens that they produce and consume, and by the result of `called_for`.
 
     Produce what an effect or channel needs, and consume what an effect produces; compute the Reason only from the
     scene and the sensor.
@@ -181,7 +181,7 @@ def effect_takes_part(subject: Subject) -> None:
     effects, produced = subject.registry.effects, subject.descriptor.produces
     wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *(token for one in effects for token in one.consumes)}
     if not wanted.intersection(produced):
-        fail(f"produces{list(produced)}", f"nothing needs it: needed are {', '.join(sorted(wanted))}")
+        fail(f"produces{list(produced)}", f"no effect or channel needs it; needed tokens: {', '.join(sorted(wanted))}")
     for unknown in set(subject.descriptor.consumes) - {token for one in effects for token in one.produces}:
         fail(f"consumes[{unknown}]", "no installed effect produces it")
     sensors = simulated_sensors(subject)
@@ -189,11 +189,11 @@ def effect_takes_part(subject: Subject) -> None:
     with code_of("called_for", subject):
         answers = {repr([called_for(scene, one.spec) for one in sensors]) for _ in range(CALLS)}
     if len(answers) > 1:
-        fail("called_for", "it returns another reason for the same scene and sensor")
+        fail("called_for", "a second call with the same scene and sensor returns another reason")
 
 
 def _changeable(run: Any) -> dict[str, list[Any]]:
-    """Return the arrays of a synthesis that an effect could change, by what they mean."""
+    """Return the arrays of a simulated recording that an effect could change, by their meaning."""
     tracks = run.tracks
     return {"true force": [run.load.force_n, *(one.force_n for one in tracks)], "reference": [run.reference_n],
             "clock": [run.t_s, *(one.t_s for one in tracks)],
@@ -203,7 +203,7 @@ def _changeable(run: Any) -> dict[str, list[Any]]:
 
 @check("effect", needs="effect-takes-part")
 def it_is_applied(subject: Subject) -> None:
-    """An effect changes a recording in the making: one NaN ends every cell, one draw elsewhere is never repeated.
+    """An effect changes a recording in progress: one NaN spoils every cell, one global draw every repetition.
 
     Let `where` name a function of one argument, the synthesis, that changes what it `produces` in place; guard
     divisions; draw from run.of_recording(…), run.of_session(…) or run.of_unit(…).
@@ -213,7 +213,7 @@ def it_is_applied(subject: Subject) -> None:
     words = [one.descriptor.name for one in every if one.distribution == subject.distribution]  # candidates
 
     def press(sensor: SensorDescriptor, sign: str, seed: int = 1) -> tuple[Recorded, dict[str, list[Any]]]:
-        """Return a press with the effect ("+") or without it ("-"), and what an effect could change in it."""
+        """Return a press with the effect (sign "+") or without it ("-"), and the arrays that an effect could change."""
         simulation, held = Simulation(effects=(*words, f"{sign}{subject.name}")), list[Any]()
         own = scene.model_copy(update={"simulation": simulation})
         with code_of("where", subject):
@@ -225,19 +225,19 @@ def it_is_applied(subject: Subject) -> None:
         with suppress(CheckSkipped):
             _, found = press(sensor, "+")
             if any(np.isnan(one).any() for one in found["readings"]):
-                fail("where", "a reading is not a number after it, and not marked as MISSING")
+                fail("where", "after the effect, a reading is NaN and not marked as MISSING")
             changed = ["readings"]  # where the rig cannot do without it, or it does something else
             if READINGS.issuperset(subject.descriptor.produces):
                 with suppress(CheckFailed, CheckSkipped):
                     changed = differing(found, press(sensor, "-")[1])
             for name in set(changed) - {"readings"}:
-                fail("where", f"it changes the {name}, which its `produces` does not name")
+                fail("where", f"the effect changes the {name}, which is not in its `produces`")
         if changed:
             break
     if changed is None:
-        skip("no simulated sensor goes with it")
+        skip("no simulated sensor is applicable")
     if not changed:
-        fail("where", "no reading is another one after it: does it change a copy, or an amount that is 0?")
+        fail("where", "the effect changes no reading: does it act on a copy, or is its amount 0?")
     second, _ = press(sensor, "+", 2)
     for module in [one for one in sys.modules if one.partition(".")[0] == subject.package != "tactbench"]:
         del sys.modules[module]
@@ -246,10 +246,10 @@ def it_is_applied(subject: Subject) -> None:
 
 @check("indenter", needs="code-names-resolve")
 def indenter_is_pressed(subject: Subject) -> None:
-    """Heights are computed at all places at once and counted from the lowest point, which touches first.
+    """Heights are computed for all places at once and measured from the lowest point, which makes first contact.
 
     Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
-    body is; choose defaults with flanks of up to 45 degrees. Never change x_mm or y_mm.
+    body is present; choose defaults with flanks of up to 45 degrees. Never change x_mm or y_mm.
     """
     numbers = subject.descriptor.dimensions
     sizes = {name: one.default for name, one in numbers.items()}
@@ -263,15 +263,15 @@ def indenter_is_pressed(subject: Subject) -> None:
         with code_of("where", subject):
             found = np.asarray(subject.code("where")(line[:, None], line[None, :], **{**sizes, **changed}))
         if found.shape != (61, 61) or not np.isfinite(found).all():
-            text = f"for places of shapes (61, 1) and (1, 61) it returned shape {found.shape}, or no finite heights"
+            text = f"for places of shapes (61, 1) and (1, 61), the result has shape {found.shape}, or no finite heights"
             fail("where", f"{text}, with {changed or sizes}")
         return found
 
     found = heights()
     if abs(found[30, 30]) > LOWEST_MM or found.min() < -LOWEST_MM:
-        fail("where", f"it is {found[30, 30]:g} mm high at (0, 0), at least {found.min():g} mm: 0 is needed")
+        fail("where", f"the height is {found[30, 30]:g} mm at (0, 0), and {found.min():g} mm at least: 0 is needed")
     if not np.array_equal(found, heights()):
-        fail("where", "it gives other heights for the same places when it is called again")
+        fail("where", "a second call gives other heights for the same places")
     for name, one in numbers.items():
         same = list[bool]()
         for share in (0.7, 1.4):
@@ -279,30 +279,30 @@ def indenter_is_pressed(subject: Subject) -> None:
             with suppress(UsageError):  # dimensions that do not go with each other
                 same += [] if value == one.default else [np.array_equal(heights(**{name: value}), found)]
         if same and all(same):
-            fail(f"dimensions[{name}]", "the heights are the same whatever it is")
+            fail(f"dimensions[{name}]", "the heights do not depend on this dimension")
     body, highest_mm = found > LOWEST_MM, found[np.hypot(line[:, None], line) <= 1.5 * largest_mm].max()
     if highest_mm < FLAT * largest_mm:
         text = f"{highest_mm:.2g} mm high within 1.5 of its largest dimension, {largest_mm:g} mm"
         fail("where", f"{text}: are x_mm and y_mm read in millimetres?")
     if body.any() and not body[0].any() and not body[:, 0].any():
-        fail("where", f"it is 0 mm high {line[-1]:.3g} mm away: 50 mm or more is needed where no body is")
+        fail("where", f"the height is 0 mm at {line[-1]:.3g} mm: 50 mm or more is needed beside the body")
     default = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
     first_press(subject, tiny_scene(indenter=Indenter(shape=subject.name, dimensions=default)), "where")
 
 
 @check("profile", needs="code-names-resolve")
 def path_is_recorded(subject: Subject) -> None:
-    """A recording is tared on its own unloaded hold, and has as many samples of the force as the path says.
+    """A recording needs an unloaded hold for taring, and enough samples to reach the force of the path.
 
-    Begin with a hold at 0 N, state newtons (a gram-force is 0.0098 N), and give samples enough for each piece.
+    Begin with a hold at 0 N, state newtons (a gram-force is 0.0098 N), and give enough samples for each piece.
     """
     with code_of("where", subject):
         path = force_path(subject.descriptor, {}, WHY)
     if path.forces_n[0] != 0 or not path.hold_s > 0:
-        fail("where", f"it begins at {path.forces_n[0]:g} N with {path.hold_s:g} s of hold: none is left to tare on")
+        fail("where", f"the path starts at {path.forces_n[0]:g} N and holds {path.hold_s:g} s: no time for taring")
     if path.largest_n > MOST_N:
-        fail("where", f"its largest force is {path.largest_n:g} N by default: are these gram-force?")
+        fail("where", f"the largest force is {path.largest_n:g} N by default: are these gram-force?")
     made = first_press(subject, tiny_scene(profile=path), "where")
     recorded = float(pressing_force(made.came, made.meta.reference)[1].max())
     if abs(recorded - path.largest_n) > FORCE_SHARE * path.largest_n:
-        fail("where", f"its {path.samples} samples reach {recorded:.3g} N, and the path {path.largest_n:g} N")
+        fail("where", f"the {path.samples} samples reach {recorded:.3g} N, but the path {path.largest_n:g} N")

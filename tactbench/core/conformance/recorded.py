@@ -1,4 +1,4 @@
-"""Checks of recordings: of one of a sensor, and of those that a data set's mapping makes. No code of a plugin runs."""
+"""Checks of recordings, of a sensor or made by a data set's mapping. They run no code of a plugin."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _read(subject: Subject) -> Recorded:
 
 @check("sensor", mode="recording")
 def recording_fits_the_spec(subject: Subject) -> None:
-    """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
+    """A real unit shows another rate, range, sign or force than stated if the spec or the decoding is wrong.
 
     Give a healthy recording of this sensor (`tactbench inspect FILE`). Correct rate_hz, lower, upper and sign of the
     spec, the type and byte order of the decoding, how the device is set up, or the force's unit in the mapping (1 gf is
@@ -57,14 +57,14 @@ def recording_fits_the_spec(subject: Subject) -> None:
     spec = subject.registry.sensors[subject.name].spec
     unknown = {one.name for one in meta.sensor.channels()} - {one.name for one in spec.channels()}
     if meta.sensor.name != spec.name or unknown:
-        fail("meta.sensor", f"it is of {meta.sensor.name!r}, with unknown channels: {', '.join(sorted(unknown))}")
+        fail("meta.sensor", f"it is for {meta.sensor.name!r}, with unknown channels: {', '.join(sorted(unknown))}")
     if wrong:
         fail("file", wrong)
     fits(meta, data, spec)
 
 
 def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) -> None:
-    """Fail where a recording shows forces beyond a finger's, or another rate, range, rest or sign than `spec`."""
+    """Fail if a recording has forces beyond a finger's, or another rate, range, rest level or sign than `spec`."""
     pressing = None
     known = [one for each in meta.reference if each.name in data for one in each.channels]
     if any(one.kind == "force" and one.name in ("fz", "normal") for one in known):
@@ -92,7 +92,7 @@ def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) 
                 ends = [one for one in limits_of(own) if np.isfinite(one)]
                 near = max(FAR * (high - low), FAR_IN_RANGE * (np.ptp(ends) if ends else 0.0))
                 if not low - near <= rest <= high + near:
-                    fail(f"{where}.rest", f"{rest:g} is stated, and it reads {low:g} to {high:g}")
+                    fail(f"{where}.rest", f"{rest:g} is stated, but unloaded readings are {low:g} to {high:g}")
             whole = np.isfinite(values) & np.isfinite(load)
             if channel.kind == "taxel" and np.unique(values[whole]).size > 1 and np.unique(load[whole]).size > 1:
                 correlation = float(np.corrcoef(values[whole], load[whole])[0, 1])
@@ -103,12 +103,12 @@ def fits(meta: RecordingMeta, data: Mapping[str, StreamData], spec: SensorSpec) 
 
 @check("sensor", mode="recording", needs="recording-fits-the-spec")
 def recording_is_of_a_real_unit(subject: Subject) -> None:
-    """Only a real unit shows what a sensor is; a simulation shows what somebody believes it to be.
+    """Only a recording of a real unit shows the sensor's true behaviour; a simulation shows assumptions about it.
 
     Record a real unit, or import recordings of one.
     """
     if _read(subject).meta.simulated:
-        skip("it is simulated, or its devices are emulated")
+        skip("the recording is simulated, or its devices are emulated")
 
 
 def _mapping(subject: Subject) -> model.Mapping:
@@ -118,10 +118,10 @@ def _mapping(subject: Subject) -> model.Mapping:
 
 @check("dataset")
 def tasks_can_be_answered(subject: Subject) -> None:
-    """A task is looked up, and what it asks for, when everything has been fetched and imported.
+    """Tasks and the data they need are looked up only after all files have been fetched and imported.
 
     Name tasks of `tactbench list tasks`, or of the mapping, under `source.tasks`: the mapping must have their target
-    and features. A session is what was recorded without mounting anew, and holds several trials.
+    and features. A session holds several trials, recorded without mounting anew.
     """
     mapping = _mapping(subject)
     streams = mapping.streams.values()
@@ -139,7 +139,7 @@ def tasks_can_be_answered(subject: Subject) -> None:
             asked, there = target.name, labels
         if not sensed & {*spec.features, *spec.optional_features} or (asked is not None and asked not in there):
             text = f"{name} predicts {asked} from {' or '.join(spec.features)}"
-            fail("source.tasks", f"{text}; there is {', '.join(sorted(there)) or 'none'} beside {', '.join(sensed)}")
+            fail("source.tasks", f"{text}; recorded: {', '.join(sorted(there)) or 'no target'}; {', '.join(sensed)}")
     names = mapping.recording.session, mapping.recording.trial
     session, trial = (set(re.findall(r"\{(\w+)", name)) for name in names)
     if trial and trial <= session:
@@ -148,9 +148,9 @@ def tasks_can_be_answered(subject: Subject) -> None:
 
 @check("dataset", needs="tasks-can-be-answered")
 def readings_are_as_stated(subject: Subject) -> None:
-    """A wrong statement of a mapping is stored with the recordings, and their readers rely on it.
+    """Wrong statements in a mapping are stored with the recordings, and readers of the recordings rely on them.
 
-    Look at columns, units (`given_in`), sentinels, `sign`, `lower`, `upper`, `rest` and `rate_hz` of the channels that
+    Check columns, units (`given_in`), sentinels, `sign`, `lower`, `upper`, `rest` and `rate_hz` of the channels that
     are named, and at the unit of the time.
     """
     mapping, file = _mapping(subject), Path(subject.module)
@@ -158,7 +158,7 @@ def readings_are_as_stated(subject: Subject) -> None:
     folders = (copy_in(subject.root, first), DataSet(file).files, file.parent)
     root = next((one for one in folders if one is not None and first and (one / first).is_file()), None)
     if first and root is None:
-        skip("its files are not here, and none is fetched: `--root DIR` names a folder that holds a copy")
+        skip("the data set's files are missing, and checks fetch none: give `--root DIR`, a folder with a copy")
     roles: Counter[str | None] = Counter()
     with TemporaryDirectory() as folder:
         with code_of(subject.module, subject):

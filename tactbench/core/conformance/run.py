@@ -1,4 +1,4 @@
-"""Running of checks in a child process, which may hang or crash, and the report of their outcomes."""
+"""Running of checks in a child process, as a check may hang or crash, and the report of outcomes."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ for _checks in contributed("tactbench.checks").values():
     _checks.load()
 
 TIMEOUT_S = 60.0
-"""Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two on an idle core."""
+"""Time limit of one check [s]; the slowest in tactbench, on the largest skin, takes 2 s on an idle core."""
 
 
 def checks_of(kind: Kind, *modes: Mode) -> tuple[Check, ...]:
-    """Return the checks of a kind of plugin in some modes, in their order."""
+    """Return the checks of a kind of plugin in the given modes, in their order."""
     return tuple(one for one in CHECKS if kind in one.kinds and one.mode in modes)
 
 
 @dataclass(frozen=True)
 class CheckReport:
-    """Outcomes of the checks of one plugin."""
+    """Report of the outcomes of the checks of one plugin."""
 
     kind: Kind
     name: str
@@ -58,22 +58,22 @@ class CheckReport:
     outcomes: tuple[CheckOutcome, ...] = field(repr=False)
 
     def of(self, status: str) -> tuple[CheckOutcome, ...]:
-        """Return the outcomes of a status: passed, failed or skipped."""
+        """Return the outcomes with a status: passed, failed or skipped."""
         return tuple(one for one in self.outcomes if one.status == status)
 
     @property
     def failed(self) -> tuple[CheckOutcome, ...]:
-        """The checks that failed."""
+        """Outcomes of the checks that failed."""
         return self.of("failed")
 
     @property
     def ok(self) -> bool:
-        """Whether no check failed."""
+        """True if no check failed."""
         return not self.failed
 
     @property
     def level(self) -> str | None:
-        """Level that the passed checks give; None if a check failed, or only a recording was read."""
+        """Level reached by the passed checks; None if a check failed, or only a recording was read."""
         passed = {one.check for one in self.of("passed")}
         if "passive" not in self.modes or self.failed or not passed:
             return None
@@ -83,7 +83,7 @@ class CheckReport:
 
     @property
     def summary(self) -> str:
-        """Numbers of checks by status, in one line."""
+        """Counts of checks by status, as one line of text."""
         counts = ", ".join(f"{status} {len(self.of(status))}" for status in ("passed", "failed", "skipped"))
         return f"{self.kind} {self.name}: {counts}.{f' Level: {self.level}.' if self.level else ''}"
 
@@ -92,12 +92,12 @@ class CheckReport:
 
 
 def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
-    """Return the descriptors called `name`, or else all descriptors of a plugin of that name.
+    """Return the descriptors called `name`, or else all descriptors of the plugin of this name.
 
     Raises
     ------
     UnknownNameError
-        If there is none, and no plugin of that name that failed to load.
+        If there is no such descriptor, and no plugin of this name that failed to load.
     """
     rows = plugins_named(registry, name)
     every = [(kind, one) for kind in kinds if kind != "dataset" for one in registry.families()[f"{kind}s"].all_owned()]
@@ -133,17 +133,17 @@ def run_checks(
     without: Collection[str] = (),
     **fields: Any,
 ) -> CheckReport:
-    """Run the checks of one plugin, each within limits.
+    """Run the checks of one plugin, each within a time limit.
 
     Parameters
     ----------
     modes
-        Modes of the checks. In the mode `recording` the plugin's code is not imported.
+        Modes of the checks. In the mode `recording`, the plugin's code is not imported.
     isolated
-        Whether in a child process. Checks of the mode `invasive` are always run in this process, without a time limit:
+        True: run in a child process. Checks of the mode `invasive` always run in this process, without a time limit:
         an interrupt must reach the rig.
     without
-        Names of checks that are left out.
+        Names of checks to leave out.
     fields
         Values of the subject's fields `recording`, `rig_file`, `operator` and `root`.
     """
@@ -155,7 +155,7 @@ def run_checks(
         for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; the remaining checks run in another process
                 late = isinstance(given, TimedOut)
-                text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
+                text = f"the check took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
@@ -166,13 +166,13 @@ def run_checks(
 
 
 def _tried(subject: Subject, outcomes: dict[str, CheckOutcome], name: str) -> CheckOutcome:
-    """Run a check unless one that it needs has not passed; its outcome is added to `outcomes`."""
+    """Run a check unless a check that it needs has not passed; add the outcome to `outcomes`."""
     (one,) = [one for one in CHECKS if one.name == name]
     began_s, outcome = time.perf_counter(), CheckOutcome(name, "passed")
     try:
         for before in filter(None, map(outcomes.get, one.needs)):
             if before.status != "passed":
-                skip(before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed")
+                skip(before.text if before.status == "skipped" else f"not tried, as {before.check} has not passed")
         with unchanged(subject) if one.mode == "passive" else nullcontext(), code_of(subject.module, subject):
             one.run(subject)
     except CheckFailed as failure:

@@ -1,4 +1,4 @@
-"""Checks of a sensor: its spec, and its transducer on states of its skin, of which no equation has to be solved."""
+"""Checks of a sensor: its spec, and its transducer on approximate skin states, for which no equation is solved."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OF_KIND = {
     "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa", "dc_temperature": "K",
     "joint": "rad",
 }  # fmt: skip
-"""A unit of what a kind of channel measures."""
+"""A unit with the dimension of the quantity that a kind of channel measures."""
 RAW = ("count", "V", "mV")
 FASTEST_HZ, SLOWEST_HZ = 1e6, 0.1
 SOONEST_S, LATEST_S = 20e-6, 0.25  # of a link's delay (assumed: an SPI word takes microseconds, a radio link 0.1 s)
@@ -42,7 +42,7 @@ PATCH_MM, PATCH_CELLS = 1.25, 1.5  # deviation of a local press: half a fingerti
 
 
 def on_sheet_mm(sheet: SkinSheet | None, position_m: Vector) -> tuple[float, float]:
-    """Return the axial coordinate and the arc length at which a place of the sensor's frame lies on the sheet [mm]."""
+    """Return the axial coordinate and the arc length on the sheet [mm] of a place in the sensor's frame [m]."""
     x_mm, y_mm, z_mm = (1e3 * part for part in position_m)
     if sheet is None or sheet.outer_radius is None:
         return x_mm, y_mm
@@ -57,7 +57,7 @@ def _channels(subject: Subject) -> Iterator[tuple[str, StreamSpec, ChannelSpec]]
 
 @check("sensor")
 def limits_are_in_order(subject: Subject) -> None:
-    """Saturation, tolerances, windows and delays are computed from limits, rest levels and rates.
+    """Saturation, tolerances, windows and delays are computed from the stated limits, rest levels and rates.
 
     State lower < upper, both within what the stream's dtype holds, and a rest level between them; whole numbers come
     from a converter and need both ends. Give force, torque, position and pressure channels a unit of that dimension,
@@ -88,14 +88,14 @@ def limits_are_in_order(subject: Subject) -> None:
 
 @check("sensor")
 def places_are_on_the_skin(subject: Subject) -> None:
-    """Millimetres make a fingertip the size of a room; a taxel off the skin's sheet, or there twice, is a copied line.
+    """Positions in millimetres make a fingertip as large as a room; a taxel off the skin, or twice, is a copied line.
 
     Convert position_m: 1 mm is 0.001, 1 inch 0.0254. Name the `site` that taxels share, and move them within the sheet:
     x from x_min to x_max, along the arc within half its width. State a unit vector as normal.
     """
     placed = [(place, one, one.position_m) for place, _, one in _channels(subject) if one.position_m is not None]
     if not placed:
-        skip("it states no place of any channel")
+        skip("the sensor states no positions of channels")
     low, high, half, sheet = -LARGEST_MM, LARGEST_MM, LARGEST_MM, None
     if subject.spec.skin is not None:
         sheet = subject.spec.skin.sheet
@@ -104,7 +104,7 @@ def places_are_on_the_skin(subject: Subject) -> None:
     spots = []
     for place, channel, position_m in placed:
         if channel.normal is not None and not abs(math.hypot(*channel.normal) - 1.0) <= UNIT_NORMAL:
-            fail(f"{place}.normal", f"its length is {math.hypot(*channel.normal):.4g}, not 1")
+            fail(f"{place}.normal", f"the length of the vector is {math.hypot(*channel.normal):.4g}, not 1")
         if channel.kind != "taxel":
             continue
         x_mm, s_mm = on_sheet_mm(sheet, position_m)
@@ -114,7 +114,7 @@ def places_are_on_the_skin(subject: Subject) -> None:
             fail(f"{place}.position_m", f"{text} (x {low:g} to {high:g} mm, arc {-half:g} to {half:g} mm): is it in m?")
         first, site = places.setdefault(position_m, (channel.name, channel.site or place))
         if site != (channel.site or place):
-            fail(f"{place}.position_m", f"it is also that of {first}")
+            fail(f"{place}.position_m", f"the position is the same as that of {first}")
     side_mm = max(high - low, 2 * half)
     if sheet is not None and len(places) >= FEW and np.ptp(spots, axis=0).max() < SPREAD * side_mm:
         text = f"taxels lie within {np.ptp(spots, axis=0).max():.3g} mm of a skin of {side_mm:g} mm"
@@ -123,13 +123,13 @@ def places_are_on_the_skin(subject: Subject) -> None:
 
 @check("sensor")
 def skin_yields_as_skins_do(subject: Subject) -> None:
-    """A modulus of another power of ten makes a sensor that feels everything, or nothing, and looks plausible.
+    """A modulus wrong by a power of ten makes a sensor respond to everything or to nothing, and looks plausible.
 
     State young in the unit of its source (1 MPa is 1000 kPa), and the thickness in millimetres.
     """
     skin = subject.spec.skin
     if not isinstance(skin, BondedLayer | FoamPad):
-        skip("it states no layer that a press indents by itself")
+        skip("the sensor has no skin with one elastic layer")
     young_mpa, thick_mm = skin.young.to("MPa"), skin.thickness.to("mm")
     # The softer of two bounds from above: a column below the punch, and a half-space of the same modulus under it
     # (Boussinesq's punch, Poisson's ratio left out: it changes this by a quarter).
@@ -142,18 +142,18 @@ def skin_yields_as_skins_do(subject: Subject) -> None:
 
 @check("sensor")
 def nuisances_are_in_its_units(subject: Subject) -> None:
-    """Amounts are added to readings as they are: volts on a channel of counts are off by its whole scale.
+    """Amounts are added to readings in their stated unit: volts on a channel of counts are wrong by its whole scale.
 
-    Name a kind of channel that the sensor has, and state amounts in its unit, shares in 1, time constants in a time.
+    Name a kind of channel that the sensor has, and state amounts in its unit, shares in 1, time constants in s or ms.
     """
     spec = subject.spec
     if not spec.nuisances:
-        skip("it states no nuisances")
+        skip("the sensor states no nuisances")
     device = spec.data_sheet.exists or any(np.dtype(one.dtype).kind in "iu" for one in spec.streams)
     for kind, nuisances in spec.nuisances.items():
         where, channels = f"spec.nuisances[{kind}]", spec.channels(kind)
         if not channels:
-            fail(where, f"it has no {kind} channel; it has {', '.join({one.kind for one in spec.channels()})}")
+            fail(where, f"no channel is of kind {kind}; there are {', '.join({one.kind for one in spec.channels()})}")
         if device and nuisances.white.value == nuisances.step.value == 0:
             fail(where, "white and step are both 0: every reading is exact; state one of them")
         for field in nuisances.model_fields_set - {"creep"}:
@@ -161,16 +161,16 @@ def nuisances_are_in_its_units(subject: Subject) -> None:
             share = field.endswith("_scatter") or field in ("unit_gain", "offset_smooth")
             unit = "1" if share else channels[0].unit
             if amount is not None and not field.endswith("_tau") and amount.unit != unit:
-                fail(f"{where}.{field}", f"its unit is {amount.unit!r}, and {unit!r} is needed")
+                fail(f"{where}.{field}", f"the unit is {amount.unit!r}, and {unit!r} is needed")
 
 
 def observed(subject: Subject) -> tuple[ChannelSpec, ...]:
-    """Return the channels that the transducer answers for."""
+    """Return the channels whose readings the transducer computes."""
     return tuple(subject.spec.channels("taxel", "dc_pressure"))
 
 
 def skin_grid(sheet: SkinSheet) -> SkinGrid:
-    """Return the centres of the sheet's own cells."""
+    """Return the centres of the grid cells of the sheet."""
     along, across = sheet.cells
     low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
     x_mm: FloatArray = low + (np.arange(along) + 0.5) * (high - low) / along
@@ -179,7 +179,7 @@ def skin_grid(sheet: SkinSheet) -> SkinGrid:
 
 
 def patch_mm(grid: SkinGrid) -> float:
-    """Return the standard deviation of a local press."""
+    """Return the standard deviation of the bell-shaped pressure of a local press [mm]."""
     return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
 
 
@@ -190,7 +190,7 @@ def _prepared(subject: Subject, names: tuple[str, ...]) -> Any:
 
 
 def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> FloatArray:
-    """Return the readings of a state, whose arrays are read-only; by default of all channels in the spec's order."""
+    """Return the readings for a read-only state, by default of all channels in the spec's order."""
     names = names or tuple(one.name for one in observed(subject))
     transducer = _prepared(subject, names)
     for field in fields(state):
@@ -199,13 +199,13 @@ def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> Fl
     with code_of("transducer", subject), np.errstate(all="ignore"):
         given = np.asarray(transducer(state))
     if given.shape != (len(names),) or given.dtype.kind not in "fiu" or not np.isfinite(given).all():
-        text = f"for {len(names)} channels at {state.force_n:g} N it returned {given.dtype} of shape {given.shape}"
+        text = f"for {len(names)} channels at {state.force_n:g} N, the result is {given.dtype} of shape {given.shape}"
         fail("transducer", f"{text}, or no finite numbers: {given}")
     return given.astype(np.float64)
 
 
 def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged: Place = (0, 0)) -> SkinState:
-    """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
+    """Return the approximate state under a narrow press: a bell of pressure, and a dent of the same shape.
 
     No equation is solved. The dent goes a third of the way through the skin at 1 N and further in proportion, never
     through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s: it moves the
@@ -235,7 +235,7 @@ def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged
 
 @lru_cache(maxsize=2)
 def _sites(subject: Subject) -> dict[Place, list[int]]:
-    """Return the columns of the taxels at each place on the sheet [mm]."""
+    """Return the columns of the taxels, grouped by place on the sheet [mm]."""
     sites: dict[Place, list[int]] = {}
     for column, channel in enumerate(observed(subject)):
         if channel.kind == "taxel" and channel.position_m is not None:
@@ -244,7 +244,7 @@ def _sites(subject: Subject) -> dict[Place, list[int]]:
 
 
 def _places(subject: Subject) -> list[Place]:
-    """Return the pressed places: of some taxels, or the middle of the sheet where none is stated."""
+    """Return the places to press [mm]: those of some taxels, or the middle of the sheet if no position is stated."""
     sites, sheet = list(_sites(subject)), subject.spec.skin.sheet
     middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2, 0.0
     drawn = np.random.default_rng(0).permutation(len(sites))[:MOST_PRESSED]
@@ -253,14 +253,14 @@ def _places(subject: Subject) -> list[Place]:
 
 @lru_cache(maxsize=4)
 def _changes(subject: Subject, force_n: float = GENTLE_N) -> FloatArray:
-    """Return the (places, channels) changes of the readings against rest by a press at each place."""
+    """Return the (places, channels) changes of the readings from rest under a press at each place."""
     rest = _read(subject, _state(subject, 0.0))
     return np.array([_read(subject, _state(subject, force_n, at)) for at in _places(subject)]) - rest
 
 
 @check("sensor", needs="code-names-resolve limits-are-in-order")
 def transducer_reads(subject: Subject) -> None:
-    """The twin reads states from rest to overload, several times, of the channels that are requested, and adds noise.
+    """A simulation reads states from rest to overload, repeatedly and for the requested channels only, and adds noise.
 
     Return one finite number for each name in `channel_names`, as an array of shape (n,), and look channels up by these
     names: never rely on their number or order. Guard divisions by force, pressure and contact radius, which are 0 at
@@ -268,26 +268,26 @@ def transducer_reads(subject: Subject) -> None:
     read-only, and those of shear are None unless spec.reads_shear names a kind of channel.
     """
     if subject.descriptor.transducer is None:
-        skip("it names no transducer: it can be recorded and replayed, not simulated")
+        skip("the sensor has no transducer: it can be recorded and replayed, not simulated")
     if subject.spec.skin is None:
-        fail("spec.skin", "it names a transducer and declares no skin to read from")
+        fail("spec.skin", "the sensor has a transducer, but declares no skin")
     names = tuple(one.name for one in observed(subject))
     if not names:
-        skip("it has no channel that is read from the skin (taxel, dc_pressure)")
+        skip("the sensor has no channel that is read from the skin (taxel, dc_pressure)")
     _, first, _ = (_read(subject, _state(subject, force_n)) for force_n in (0.0, GENTLE_N, OVERLOAD_N))
     fewer = names[max(1, len(names) // 2) :: -1]
     again = dict(zip(fewer, _read(subject, _state(subject, GENTLE_N), fewer), strict=True))
     for name, value in zip(names, first, strict=True):
         # A solver may stop elsewhere for fewer channels.
         if not math.isclose(again.get(name, value), value, rel_tol=1e-3, abs_tol=1e-6):
-            fail("transducer", f"{name} reads {value:g}, and {again[name]:g} again, in another order of channels")
+            fail("transducer", f"{name} reads {value:g}, but {again[name]:g} in another order of channels")
 
 
 @check("sensor", needs="transducer-reads")
 def rest_is_as_stated(subject: Subject) -> None:
-    """The spec's rest level is what drivers, tares and tables take for unloaded; the twin begins where this reads.
+    """Drivers, tares and tables use the spec's rest level as unloaded; a simulation starts at the transducer's.
 
-    State the `rest` that the transducer gives at zero load, or add it there.
+    State as `rest` the transducer's reading at zero load, or add `rest` in the transducer.
     """
     for channel, found in zip(observed(subject), _read(subject, _state(subject, 0.0)), strict=True):
         rest = found if channel.rest is None else channel.rest.to(channel.unit)
@@ -299,10 +299,10 @@ def rest_is_as_stated(subject: Subject) -> None:
 
 @check("sensor", needs="transducer-reads")
 def it_answers_to_a_press(subject: Subject) -> None:
-    """A change below noise and step carries no information; newtons that are lost make a sensor too good.
+    """A change below noise and step carries no information; readings beyond the applied force make a sensor too good.
 
-    Look at units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity. Channels in newton sum
-    pressure over area: 1 MPa on 1 mm2 is 1 N, a gram-force 0.0098 N. Where it falls back under more load, look for a
+    Check units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity. Channels in newton sum
+    pressure over area: 1 MPa on 1 mm2 is 1 N, a gram-force 0.0098 N. If a reading decreases under more load, look for a
     limit that wraps, an absolute value, or a thickness that goes below 0.
     """
     every, changes = observed(subject), _changes(subject)
@@ -313,53 +313,53 @@ def it_answers_to_a_press(subject: Subject) -> None:
         fail("transducer", f"{GENTLE_N:g} N change no channel by more than noise and step, but by {most.min():.3g}")
     # A sensor at its end gives the same reading twice; a hundredth is left to solvers.
     if (firm < 0.99 * most).any():
-        fail("transducer", f"its largest changes are {most} under {GENTLE_N:g} N and {firm} under {FIRM_N:g} N")
+        fail("transducer", f"the largest changes are {most} under {GENTLE_N:g} N and {firm} under {FIRM_N:g} N")
     forces = [one.unit == "N" for one in every]
     share = float(np.median(np.abs(changes[:, forces].sum(axis=1)))) / GENTLE_N
     if any(forces) and not SHARES[0] <= share <= SHARES[1]:
-        fail("transducer", f"its channels sum to {share:.3g} N under {GENTLE_N:g} N{likely(share)}")
+        fail("transducer", f"the channels sum to {share:.3g} N under {GENTLE_N:g} N{likely(share)}")
 
 
 @check("sensor", needs="it-answers-to-a-press")
 def response_is_where_it_is_pressed(subject: Subject) -> None:
-    """Swapped axes, a mirrored layout or places in another frame give plausible readings of the wrong taxels.
+    """Swapped axes, a mirrored layout or positions in another frame give plausible readings of the wrong taxels.
 
     SkinState's arrays are (x, s): x along the finger, first; s across it. position_m is (x, y, z) in metres.
     """
     sites, pressed = _sites(subject), np.array(_places(subject))
     if len(sites) < 2:
-        skip("it states no places of several taxels")
+        skip("the sensor states positions of fewer than two taxels")
     changes = np.abs(_changes(subject))
     weights = np.array([changes[:, columns].max(axis=1) for columns in sites.values()]).T
     centres = weights @ np.array(list(sites)) / weights.sum(axis=1, keepdims=True)
     slopes = np.linalg.lstsq(pressed - pressed.mean(axis=0), centres - centres.mean(axis=0))[0]
     wide = np.ptp(pressed, axis=0) >= patch_mm(skin_grid(subject.spec.skin.sheet)) / 2
     if (wide & ~(np.diag(slopes) > STAYS)).any():
-        text = f"its response moves by {np.diag(slopes).round(3)} of the way of a press along x and the arc"
+        text = f"the response moves {np.diag(slopes).round(3)} times as far as a press along x and the arc"
         fail("transducer", f"{text}: are axes swapped or mirrored? Is position_m in metres?")
 
 
 @check("sensor", needs="it-answers-to-a-press")
 def shear_turns_with_its_direction(subject: Subject) -> None:
-    """Dragged the other way, skin moves the other way; a magnitude without its sign has no direction.
+    """Dragging the skin in the opposite direction must reverse the shear readings; a magnitude alone has no direction.
 
-    Read tangential_displacement_mm and shear_mpa with their signs: [0] along x, [1] along s. Or leave reads_shear out.
+    Read tangential_displacement_mm and shear_mpa with their signs: [0] along x, [1] along s. Or omit `reads_shear`.
     """
     if not subject.spec.reads_shear:
-        skip("its spec names no kind of channel that reads shear")
+        skip("the spec names no kind of channel that reads shear")
     every, ways = observed(subject), SHEAR * np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
     along_x, along_y, *back = (_read(subject, _state(subject, GENTLE_N, None, (x, y))) for x, y in ways)
     turned = np.array([along_x, along_y]) - back
     if not turned.any():
-        fail("spec.reads_shear", "dragged along x or y and back, no channel changes")
+        fail("spec.reads_shear", "no channel changes under a drag along x or y, in either direction")
     named = np.array([[axis in axes_named(one.name) for one in every] for axis in "xy"], dtype=float)
     sums = np.abs(turned) @ named.T
     falls = all(one.unit == "N" for one in every) and ((turned * named).sum(axis=1) < 0).any()
     if falls or np.linalg.det(sums) < 0:
-        text = f"dragged along x its x and y channels change by {sums[0]}, along y by {sums[1]}"
+        text = f"under a drag along x, the x and y channels change by {sums[0]}, along y by {sums[1]}"
         fail("transducer", f"{text}: are axes swapped, or is a sign turned?")
 
 
 def axes_named(name: str) -> str:
-    """Return the axes that a channel's name has as a word of their own, or behind f or b: ``x1``, ``t3_x``, ``Bx``."""
+    """Return the axes in a channel's name, as a separate word or preceded by f or b: ``x1``, ``t3_x``, ``Bx``."""
     return "".join(re.findall(r"(?:^|(?<=[^a-z]))[fb]?([xyz])(?=[^a-z]|$)", name.lower()))

@@ -1,4 +1,4 @@
-"""Checks of a task: every name it uses exists, and its scenes can be carried out."""
+"""Checks of a task: all names in it exist, and its scenes can be carried out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GROUPS = ("recording", "unit", "trial", "press", "object", "block")  # of record
 
 
 def _planned(spec: TaskSpec) -> Iterator[tuple[str, PlannedScene]]:
-    """Yield every planned scene with its place in the spec."""
+    """Yield every planned scene, with its place in the spec as text."""
     for name, campaign in (("scenes", spec.scenes), *((f"campaigns[{k}]", v) for k, v in spec.campaigns.items())):
         for planned in campaign:
             yield f"spec.{name}[{planned.scene.name}]", planned
@@ -33,7 +33,7 @@ def _planned(spec: TaskSpec) -> Iterator[tuple[str, PlannedScene]]:
 
 @check("task")
 def names_are_known(subject: Subject) -> None:
-    """Protocols, splits and estimators are looked up when everything has been recorded.
+    """Protocols, splits and estimators are looked up only after everything has been recorded.
 
     Name protocols of docs/protocols.md, splits that its recordings serve, and estimators and baselines of its kind.
     """
@@ -45,23 +45,23 @@ def names_are_known(subject: Subject) -> None:
     with code_of("spec.protocols", subject):
         for name in spec.protocols:
             if protocol_called(name).roles_only and missing:
-                fail("spec.protocols", f"{name} chooses on recordings of the role {min(missing)}; no scene has it")
+                fail("spec.protocols", f"{name} needs recordings of the role {min(missing)}; no scene has this role")
     labels = {label for _, planned in _planned(spec) for label in planned.scene.labels}
     known = {*SPLITS_WITHOUT_GROUPS, *GROUPS, *spec.campaigns, *labels}
     for name in spec.splits:
         # Without scenes, a group may be any annotation of recordings that others have made.
         if name not in known and shots(name) is None and (spec.scenes or nearest(name, known)):
-            fail("spec.splits", f"recordings of this task have no split {name!r}, only {', '.join(sorted(known))}")
+            fail("spec.splits", f"recordings of this task allow no split {name!r}, only {', '.join(sorted(known))}")
     for field in ("estimators", "baselines"):
         with code_of(f"spec.{field}", subject):
             for found in [subject.registry.estimators[name] for name in getattr(spec, field)]:
                 if spec.kind not in found.kinds or found.baseline < (field == "baselines"):
-                    fail(f"spec.{field}", f"{found.name} is no trivial answer, or not for {spec.kind}")
+                    fail(f"spec.{field}", f"{found.name} is not a baseline, or not for {spec.kind}")
 
 
 @check("task")
 def metric_has_its_unit(subject: Subject) -> None:
-    """The unit stands beside every score: errors are computed in the target's unit, and are not converted.
+    """The unit is shown with every score, but errors are computed in the target's unit and are not converted.
 
     Name a metric of the task's kind; state the target's unit for errors (rmse, mae, mean_euclidean_error), else 1.
     """
@@ -81,7 +81,7 @@ def metric_has_its_unit(subject: Subject) -> None:
 
 @check("task")
 def answers_are_in_the_scenes(subject: Subject) -> None:
-    """The answer must stand in every recording, each class be taught, and no feature be the answer itself.
+    """Every recording must contain the target, training data every class, and no feature may be the target itself.
 
     Put the target's name among the labels of every scene and every class into the role train; record the features
     (`observe`), and leave the target's kind out of them.
@@ -89,23 +89,23 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
     spec, target = subject.spec, subject.spec.target
     given_away = {*spec.features, *spec.optional_features} & {getattr(target, "kind", None), *REFERENCE}
     if given_away:
-        fail("spec.features", f"it holds {min(given_away)}, the target's kind or one that the reference records")
+        fail("spec.features", f"{min(given_away)} is the target's kind, or one that the reference records")
     for place, planned in _planned(spec):
         scene = planned.scene
         if not set(spec.features) & set(scene.observe):
             fail(f"{place}.observe", f"{', '.join(scene.observe)}: none of the features {', '.join(spec.features)}")
         if isinstance(target, LabelTarget) and target.name not in scene.labels:
             there = " or ".join(nearest(target.name, scene.labels) or scene.labels) or "none"
-            fail(f"{place}.labels", f"it has no {target.name!r}, which the target asks for; there is {there}")
+            fail(f"{place}.labels", f"the task's target {target.name!r} is missing; there is {there}")
     names = [planned.scene.name for planned in spec.scenes]
     for name in names:
         if names.count(name) > 1:
-            fail(f"spec.scenes[{name}].name", "two scenes have it: the second overwrites the first")
+            fail(f"spec.scenes[{name}].name", "two scenes have this name: the second overwrites the first")
     if isinstance(target, LabelTarget) and spec.scenes:
         taught = {planned.scene.labels[target.name] for planned in spec.scenes if planned.role == "train"}
         strange = {planned.scene.labels[target.name] for planned in spec.scenes} - taught
         if len(taught) == 1 or (spec.kind == "classification" and taught and strange):
-            text = f"role train teaches {', '.join(map(str, taught))} only; other roles have"
+            text = f"role train has the labels {', '.join(map(str, taught))} only; other roles have"
             fail("spec.scenes", f"{text} {', '.join(sorted(map(str, strange))) or 'the same'}")
         _label_is_one_thing(spec, target)
     if "roles" not in spec.splits:
@@ -116,13 +116,13 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
     )
     sessions = {one.session for one in tests}
     if any(one in training for one in tests):
-        fail("spec.scenes", "a scene of the role test is one of training, in the same session")
+        fail("spec.scenes", "a scene of the role test is also a training scene, in the same session")
     if len(spec.scenes) > 2 and sessions <= {one.session for one in training}:
-        fail("spec.scenes.session", f"every test session is one of training: {', '.join(sorted(sessions))}")
+        fail("spec.scenes.session", f"every test session is also a training session: {', '.join(sorted(sessions))}")
 
 
 def _leaves(given: Mapping[str, Any], way: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the numbers (SI) and texts of a dumped model by their places."""
+    """Yield the numbers (in SI units) and texts in a model's data, each with its place."""
     for name, one in given.items():
         if isinstance(one, Mapping) and "unit" in one:
             yield f"{way}{name}", one["value"] * units.parse(one["unit"])[0]
@@ -133,7 +133,7 @@ def _leaves(given: Mapping[str, Any], way: str = "") -> Iterator[tuple[str, Any]
 
 
 def _label_is_one_thing(spec: TaskSpec, target: LabelTarget) -> None:
-    """Fail where a label goes with two parts of the scenes, so that either gives it away, or is in another unit."""
+    """Fail if two parts of the scenes each determine the label, or if the label is in another unit."""
     scenes = [planned.scene for planned in spec.scenes]
     labels: list[Any] = [scene.labels[target.name] for scene in scenes]
     unit = target.unit if "unit" in target.model_fields_set else spec.unit
@@ -152,12 +152,12 @@ def _label_is_one_thing(spec: TaskSpec, target: LabelTarget) -> None:
         if np.allclose(factors, factors[0], rtol=1e-6, atol=0) and power and math.isclose(power, round(power)):
             fail(f"spec.scenes.labels[{target.name}]", f"it is {factors[0]:g} times {place}, in SI units: which unit?")
     if len(scenes) >= LEAST_SCENES and len(parts) > 1:
-        text = f"{target.name} goes with {' and with '.join(parts.values())}: either gives it away"
-        fail("spec.scenes", f"{text}; vary one of them independently")
+        text = f"{target.name} varies with {' and with '.join(parts.values())}: each reveals it"
+        fail("spec.scenes", f"{text}; vary one part independently")
 
 
 def _go_together(labels: Sequence[Any], values: Sequence[Any]) -> bool:
-    """Return whether of any two scenes the one with the larger label never has the smaller value, or always has it."""
+    """Return True if two series of numbers rise and fall together, or always in opposite directions."""
     ranks = [np.unique(one, return_inverse=True)[1].astype(int) for one in (labels, values)]
     signs = math.prod(np.sign(np.subtract.outer(one, one)) for one in ranks)
     return bool(np.any(signs) and (np.min(signs) >= 0 or np.max(signs) <= 0))
@@ -165,14 +165,14 @@ def _go_together(labels: Sequence[Any], values: Sequence[Any]) -> bool:
 
 @check("task", needs="answers-are-in-the-scenes")
 def scenes_can_be_pressed(subject: Subject) -> None:
-    """One scene of a hundred that cannot be carried out ends a campaign when the others are recorded.
+    """One scene in a hundred that cannot be carried out stops a campaign after the others are recorded.
 
     Name installed shapes with dimensions of theirs, and state forces in newtons and lengths in millimetres. Correct
-    what the message names: indenter, placement, slide or effects of the scene, or the target.
+    the part in the message: indenter, placement, slide or effects of the scene, or the target.
     """
     spec = subject.spec
     if not spec.scenes:
-        skip("it has no scenes: recordings made elsewhere answer it")
+        skip("the task has no scenes: it needs recordings made elsewhere")
     force = getattr(spec.target, "kind", "") == "force"
     least_n = LEAST_FORCE * units.conversion(spec.target.unit, "N") if force else 0.0
     for place, planned in _planned(spec):
@@ -183,12 +183,12 @@ def scenes_can_be_pressed(subject: Subject) -> None:
         if body.radius is not None and not LEAST_M <= body.radius.to("m") <= LARGEST_M:
             fail(f"{place}.indenter.radius", f"{body.radius} is not within {1e3 * LEAST_M:g} to {1e3 * LARGEST_M:g} mm")
         if not least_n <= force_n <= MOST_N:
-            fail(f"{place}.profile", f"its largest force is {force_n:g} N: is its unit, and that of the target, right?")
+            fail(f"{place}.profile", f"the largest force is {force_n:g} N: is its unit, and that of the target, right?")
     _check_first_press(subject, spec.scenes[0].scene)
 
 
 def _check_first_press(subject: Subject, scene: Scene) -> None:
-    """Fail where a scene cannot be simulated, or the target is not recorded."""
+    """Fail if a scene cannot be simulated, or if the target is not recorded."""
     tiny, slide = tiny_scene(), scene.slide
     if slide is not None:
         slide = slide.model_copy(update={"start": assumed(SECONDS / 2, "s", WHY), "duration": None})
@@ -199,4 +199,4 @@ def _check_first_press(subject: Subject, scene: Scene) -> None:
     for one in getattr(target, "components", (target,)):
         if isinstance(one, ChannelTarget) and not any(one.kind == k and one.name in (None, n) for k, n in recorded):
             there = ", ".join(f"{name} ({kind})" for kind, name in recorded)
-            fail("spec.target", f"no {one.kind} {one.name or ''} is recorded; there is {there}")
+            fail("spec.target", f"no {one.kind} {one.name or ''} is recorded; recorded: {there}")

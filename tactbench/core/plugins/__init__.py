@@ -1,1 +1,1 @@
-"""Search for installed sensors, rigs, tasks, estimators and effects."""
+"""Search for installed sensors, rigs, tasks, estimators, effects and other plugins."""

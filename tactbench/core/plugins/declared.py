@@ -1,4 +1,4 @@
-"""Tasks that are declared beside recordings, in addition to the installed ones."""
+"""Tasks declared in a file beside recordings, in addition to the installed tasks."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tactbench.core.spec.yaml_file import load_yaml
 
 
 def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
-    """Return the tasks of a folder of recordings and of the folders below it, except hidden ones.
+    """Return the tasks declared in a folder of recordings and in its sub-folders, except hidden ones.
 
-    Raises ConfigError for a file that is not valid, and UsageError if two files have different tasks of one name.
+    Raises ConfigError for an invalid file, and UsageError if two files declare different tasks of one name.
     """
     found: dict[str, tuple[DeclaredTask, Path]] = {}
     paths = []
@@ -34,14 +34,14 @@ def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
             known, where = found.setdefault(task.name, (task, path))
             if known != task:
                 raise UsageError(
-                    f"The task {task.name!r} is not the same in {where} and in {path}.",
-                    hint="Name a folder below with --recordings, or rename one of the two tasks.",
+                    f"The task {task.name!r} is declared differently in {where} and in {path}.",
+                    hint="Give one sub-folder with --recordings, or rename one of the two tasks.",
                 )
     return tuple(task for task, _ in found.values())
 
 
 def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry:
-    """Return the registry with `tasks` in it; raises UsageError if one has the name of an installed task."""
+    """Return the registry with `tasks` added; raise UsageError if a task has the name of an installed task."""
     each = {task.name: task for task in tasks}
     family: Family[TaskDescriptor] = Family("task")
     for owned in registry.tasks.all_owned():
@@ -49,8 +49,8 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
     for name, task in each.items():
         if name in registry.tasks:
             raise UsageError(
-                f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed one.",
-                hint="Rename it in that file, or in the mapping and import once more.",
+                f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed task.",
+                hint="Rename the task in that file, or in the mapping and import again.",
             )
         descriptor = TaskDescriptor(spec=task.spec)
         family.add(Owned(descriptor, declared_task.__name__, "recordings", "", task.model_dump_json()))
@@ -58,9 +58,9 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
 
 
 def with_declared_of(registry: Registry, rows: Iterable[Mapping[str, Any]]) -> Registry:
-    """Return the registry with the tasks in rows of results, the last of each name.
+    """Return the registry with the tasks that rows of results contain added; of tasks of one name, the last counts.
 
-    A task that cannot be read, or that has the name of an installed one, is ignored: rows may come from elsewhere.
+    A task that cannot be read, or has the name of an installed task, is ignored: rows may come from elsewhere.
     """
     found: dict[str, DeclaredTask] = {}
     for text in dict.fromkeys(str(row.get("declared_task") or "") for row in rows):

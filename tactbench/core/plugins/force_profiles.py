@@ -1,4 +1,4 @@
-"""Force paths of scenes from force profiles with a name."""
+"""Creation of a scene's force path from a named force profile."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tactbench.core.spec.rig import ProfileDescriptor
 
 
 def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by: str) -> ForcePath:
-    """Return the path of a profile with the parameters `given`, and the others by default.
+    """Return the path of a force profile, with the parameters `given` and defaults for all others.
 
     The path's source names `by` (the option or file that selects the profile), the profile and every parameter. Raises
     UsageError for a parameter that is not valid, and PluginContractError if the plugin returns no force path.
@@ -25,8 +25,8 @@ def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by:
         made = load_object(descriptor.where)(**values)
     except ValidationError as error:
         raise PluginContractError(
-            f"{what} makes no force path of {values}: {complaint(error)}.",
-            hint="Its times ascend from 0 s, and its forces are finite and 0 N or more.",
+            f"{what} gives no valid force path for {values}: {complaint(error)}.",
+            hint="Its times must ascend from 0 s, and its forces must be finite and 0 N or more.",
         ) from error
     if not isinstance(made, ForcePath):
         raise PluginContractError(

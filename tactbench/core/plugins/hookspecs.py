@@ -1,7 +1,7 @@
-"""The eight hooks of plugins.
+"""Specifications of the eight hooks by which plugins add sensors, rigs, devices, tasks and more.
 
-Each hook returns descriptors: a name, a spec, and *where* the code is as an import string, so that listing plugins
-imports nothing heavy.
+Each hook returns descriptors: a name, a spec, and in `where` the import path of the code, so that listing plugins
+imports no large package.
 """
 
 from __future__ import annotations
@@ -22,51 +22,51 @@ from tactbench.core.spec.rig import (
 )
 
 GROUP = "tactbench"
-"""Entry-point group, and the name of the pluggy project."""
+"""Name of the entry-point group of plugins, and of the pluggy project."""
 
 API_VERSION = 2
-"""Version of the plugin interface; a plugin states the one that it was written for: ``TACTBENCH_API = 2``."""
+"""Version of the plugin interface; a plugin states the version for which it was written: ``TACTBENCH_API = 2``."""
 
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)
-"""Decorator of the functions by which a plugin implements the hooks."""
+"""Decorator for the functions of a plugin that implement hooks."""
 
 
 @hookspec
 def tactbench_sensors() -> Sequence[SensorDescriptor]:  # type: ignore[empty-body]
-    """Return the sensors of the plugin."""
+    """Return the descriptors of the plugin's sensors."""
 
 
 @hookspec
 def tactbench_rigs() -> Sequence[RigDescriptor]:  # type: ignore[empty-body]
-    """Return the rigs of the plugin."""
+    """Return the descriptors of the plugin's rigs."""
 
 
 @hookspec
 def tactbench_devices() -> Sequence[DeviceDescriptor]:  # type: ignore[empty-body]
-    """Return the force sensors and motors of the plugin."""
+    """Return the descriptors of the plugin's force sensors and motors."""
 
 
 @hookspec
 def tactbench_tasks() -> Sequence[TaskDescriptor]:  # type: ignore[empty-body]
-    """Return the tasks of the plugin."""
+    """Return the descriptors of the plugin's tasks."""
 
 
 @hookspec
 def tactbench_estimators() -> Sequence[EstimatorDescriptor]:  # type: ignore[empty-body]
-    """Return the estimators of the plugin."""
+    """Return the descriptors of the plugin's estimators."""
 
 
 @hookspec
 def tactbench_effects() -> Sequence[EffectDescriptor]:  # type: ignore[empty-body]
-    """Return the simulation effects of the plugin."""
+    """Return the descriptors of the plugin's simulation effects."""
 
 
 @hookspec
 def tactbench_indenters() -> Sequence[IndenterDescriptor]:  # type: ignore[empty-body]
-    """Return the shapes of indenters of the plugin."""
+    """Return the descriptors of the plugin's indenter shapes."""
 
 
 @hookspec
 def tactbench_profiles() -> Sequence[ProfileDescriptor]:  # type: ignore[empty-body]
-    """Return the force profiles of the plugin."""
+    """Return the descriptors of the plugin's force profiles."""

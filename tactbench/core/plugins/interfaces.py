@@ -1,4 +1,4 @@
-"""Interfaces of the code that descriptors name."""
+"""Interfaces of the code to which plugins' descriptors refer."""
 
 from __future__ import annotations
 
@@ -23,78 +23,78 @@ if TYPE_CHECKING:
 
 
 class Acquisition(Protocol):
-    """A scene that is carried out by iterating over its blocks; the attributes remain valid afterwards."""
+    """A scene in progress, carried out by iterating over its blocks; the attributes remain valid afterwards."""
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The sensor's streams that will be recorded (those of its spec, perhaps with fewer channels)."""
+        """The sensor's streams to be recorded: those of its spec, possibly with fewer channels."""
 
     @property
     def reference(self) -> tuple[StreamSpec, ...]:
-        """The reference streams, for example `force_torque` with channel `fz` of kind `force`."""
+        """Streams of the reference, for example `force_torque` with channel `fz` of kind `force`."""
 
     @property
     def plan(self) -> tuple[PlanEntry, ...]:
-        """Effects included and left out, with reasons; empty for a real rig."""
+        """Effects that are included or left out, with reasons; empty for a real rig."""
 
     @property
     def assumptions(self) -> Mapping[str, Scalar]:
-        """Assumed parameters that decide the result."""
+        """Assumed parameters that strongly affect the result, by name."""
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """Facts that were drawn or achieved: the placement; ``remark …`` are texts that are shown with every score."""
+        """Facts drawn at random or achieved: the placement; a ``remark …`` is a text shown with every score."""
 
     def __iter__(self) -> Iterator[Block]: ...
 
 
 class SimulatedPress(Acquisition, Protocol):
-    """A simulated acquisition with a force curve of the skin, for an emulated motor."""
+    """A simulated acquisition that can compute the skin's force curve, for an emulated motor."""
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
-        """Return the indenter's depths, (n,) [m] ascending from the first touch, and the forces at them, (n,) [N].
+        """Return ascending depths of the indenter from first touch, (n,) [m], and the forces at these depths, (n,) [N].
 
         The last force is `largest_n`. The curve is that of a slow press, without hysteresis.
         """
 
 
 class DeviceAcquisition(Acquisition, Protocol):
-    """An acquisition from devices, with more facts once it is over."""
+    """An acquisition from devices, with further facts that are available after its end."""
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """Counts of the rows of each stream, as far as the rig knows them."""
+        """Row counts of each stream, as far as they are available to the rig."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of its drivers, by device and name."""
+        """Counts that the drivers kept, by device and name."""
 
     @property
     def ended(self) -> str:
-        """Reason for an end before its time, which makes its recording incomplete; empty: it ended in time."""
+        """Reason for an early end, which makes the recording incomplete; empty: the acquisition ended in time."""
 
 
 @dataclass(frozen=True)
 class DeviceLog:
-    """Contents of one log."""
+    """Contents of one log file of a device."""
 
     streams: tuple[StreamSpec, ...]
-    """Streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    """Streams of the sensor's spec that the log contains, possibly with fewer channels."""
     blocks: Sequence[Block]
-    """Blocks of the streams, in time order within each."""
+    """Blocks of samples of the streams, in time order within each stream."""
     clock: Literal["device", "host", "nominal", "none"]
     """Origin of the times: the device, the host that wrote the log, row number by nominal rate, or none."""
     started: str = ""
-    """Time at which the log was begun, as the file states it; empty: it states none."""
+    """Time at which logging began, as stated in the file; empty: not stated."""
     remarks: tuple[str, ...] = ()
-    """Sentences that are shown with every score from the log."""
+    """Sentences to be shown with every score from the log."""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """Counts of the reader, by name."""
+    """Counts from reading the log, by name."""
 
 
 @dataclass(frozen=True)
 class RecordingRequest:
-    """A recording that is to be made."""
+    """Description of a recording to be made."""
 
     sensor: SensorDescriptor
     rig: RigDescriptor
@@ -103,248 +103,248 @@ class RecordingRequest:
     seed: int
     role: Role | None = None
     rig_file: RigFile | None = None
-    """Devices of the rig; emulated ones are marked so, whatever the rig states."""
+    """Devices of the rig; the recording marks emulated ones even if the rig does not state them."""
     name: str = ""
-    """Name of the recording; empty: that of the scene."""
+    """Name of the recording; empty: the name of the scene."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Rig(Protocol):
-    """A rig, which carries out scenes."""
+    """A rig, which carries out scenes and yields their samples."""
 
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> AbstractContextManager[Acquisition]:
-        """Prepare `scene` with `sensor`; raises RigError or NotApplicable if it cannot be done."""
+        """Prepare `scene` with `sensor`; raise RigError or NotApplicable if the scene cannot be carried out."""
 
 
 class Explained(NamedTuple):
-    """An effect of a plan, and its cost."""
+    """An effect in a simulation's plan, and its computing time."""
 
     entry: PlanEntry
     cost_s: float | None
-    """Time of the effect for a recording on this machine [s]; None: not measured, or not separable from another's."""
+    """Computing time of the effect for a recording on this machine [s]; None: not measured, or not separable."""
     remark: str = ""
-    """Reason for the lack of a cost."""
+    """Reason why the computing time is not available."""
 
 
 class Explaining(Rig, Protocol):
-    """A simulated rig that explains its plan and the cost of each effect."""
+    """A simulated rig that can list its effects and the computing time of each."""
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = ...) -> Sequence[Explained]:
-        """Return every installed effect, the included ones first, in the order in which they are applied.
+        """Return all installed effects in the order of their application, the included effects first.
 
-        `rounds` > 0 carries the scene out that often, for the median cost of each effect.
+        If `rounds` > 0, the scene is carried out that many times, for the median computing time of each effect.
         """
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A computed number beside that of a law or a closed form."""
+    """A computed number, and the number from a physical law or an exact solution."""
 
     name: str
-    """Quantity that was computed: ``Hertz: depth under a paraboloid``."""
+    """Name of the computed quantity: ``Hertz: depth under a paraboloid``."""
     found: float
     expected: float
     bound: float
-    """Largest allowed difference of the two, included."""
+    """Largest allowed difference between the two numbers, inclusive."""
     unit: str = "1"
     source: str = ""
-    """The law with its source, and the reason for the bound."""
+    """The physical law with its source, and the reason for the bound."""
 
     @property
     def met(self) -> bool:
-        """Whether the two agree within the bound; NaN never does."""
+        """True if the two numbers agree within the bound; False for NaN."""
         return bool(abs(self.found - self.expected) <= self.bound)
 
 
 @dataclass(frozen=True)
 class CheckTable:
-    """A table about the actions of a rig by its file."""
+    """A table of the actions of a rig, as planned in its rig file."""
 
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    """Rows of texts, one for each column of `head`."""
+    """Rows, each of one text for each column of `head`."""
 
 
 @dataclass(frozen=True)
 class RigCheck:
-    """Actions of a rig by its file, and the faults of the file."""
+    """Planned actions of a rig by its rig file, and the faults of the file."""
 
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
-    """Reasons to refuse the file, each with the next step; empty: it may be used."""
+    """Reasons for refusing the rig file, each with the next step; empty: the file is valid."""
     file: RigFile | None = None
-    """The file with all that the rig's settings add to its axes; None: it has no axes."""
+    """The rig file, with the values that the rig's settings add to its axes; None: it has no axes."""
     travel_ceiling_n: float = 0.0
-    """Norm of the force at which an axis halts that does not press."""
+    """Norm of the force at which an axis that does not press halts."""
 
 
 @dataclass(frozen=True)
 class CostPoint:
-    """Cost and error of one way of computing something."""
+    """Computing time and error of one setting of a computation."""
 
     subject: str
-    """Name of the sensor that is computed."""
+    """Name of the sensor whose readings are computed."""
     observable: str
-    """Kind of channel whose error is given."""
+    """Kind of channel to which the error refers."""
     label: str
-    """Short name of the way: ``default, 48 x 64, 16 nodes``."""
+    """Short name of the setting: ``default, 48 x 64, 16 nodes``."""
     seconds: float
-    """Median time of the work that the diagram's title names."""
+    """Median time of the work named in the diagram's title."""
     error: float
-    """Root mean square of the difference to the reference."""
+    """Root mean square of the difference from the reference solution."""
     worst: float
-    """Largest difference."""
+    """Largest difference from the reference solution."""
     unit: str
     floor: float
-    """Standard deviation of the observable's own noise; infinity where it has none."""
+    """Standard deviation of the observable's own noise; infinity for an observable without noise."""
     default: bool
-    """Whether this is the default."""
+    """True if this is the default setting."""
     rung: str
-    """Name of the rung that this is; empty: it is none."""
+    """Name of the solver setting (rung) that this point shows; empty: it shows none."""
     settings: Mapping[str, Scalar]
-    """Settings of this way."""
+    """Parameters of this setting by name."""
 
 
 class CostJob(NamedTuple):
-    """A way that is still to be measured."""
+    """A measurement of computing time and error that is still to be made."""
 
     label: str
     run: Callable[[], list[CostPoint]]
-    """Function that measures it; a TactbenchError that it raises, where it cannot be measured, becomes a row."""
+    """Function that makes the measurement; a TactbenchError raised in it becomes a row."""
     rung: str = ""
-    """The rung of its points."""
+    """Name of the solver setting (rung) of the measured points."""
 
 
 class CostStudy(NamedTuple):
-    """A diagram of cost and error, and the measurements for it."""
+    """A diagram of computing time and error, and the measurements for it."""
 
     title: str
     reference: str
-    """Reference of the errors, in one sentence."""
+    """Reference solution from which errors are computed, in one sentence."""
     jobs: Sequence[CostJob]
-    """Measurements in order; the first also computes the reference."""
+    """Measurements in order; the first measurement also computes the reference."""
 
 
 class ReplayRig(Protocol):
-    """A rig with recordings of scenes that were carried out elsewhere."""
+    """A rig that returns recordings of scenes carried out elsewhere."""
 
     def recordings(self) -> Sequence[Path]:
-        """Return the files, in a fixed order; raises MissingRecordingError if there are none."""
+        """Return the files of recordings in a fixed order; raise MissingRecordingError if there is no recording."""
 
 
 class Transducer(Protocol):
-    """Conversion of skin states into a sensor's noise-free readings, for one grid."""
+    """Conversion of skin states to the noise-free readings of a sensor, on one grid."""
 
     def __call__(self, state: SkinState) -> FloatArray:
-        """Return the (n_wanted,) readings in the channels' own units, before noise, rounding and clipping."""
+        """Return the (n_wanted,) readings in the units of the channels, before noise, rounding and clipping."""
 
 
 class TransducerFactory(Protocol):
-    """Factory of a transducer, which ``SensorDescriptor.transducer`` names."""
+    """Factory of a transducer, to which ``SensorDescriptor.transducer`` refers."""
 
     def __call__(self, sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
-        """Return a transducer for `grid` and some channels; raises RigError for a channel that it cannot give."""
+        """Return a transducer for `grid` and the wanted channels; raise RigError for a channel it does not support."""
 
 
 class Reason(NamedTuple):
-    """Answer of ``EffectDescriptor.called_for``: whether a scene calls for the effect, and the reason."""
+    """Result of ``EffectDescriptor.called_for``: the decision whether a scene needs the effect, and its reason."""
 
     called_for: bool
     text: str
     change: float | None = None
-    """Change of an observed channel if the effect is left out: an upper bound if it is not called for (0: exactly
-    nothing), an estimate if it is. None: not known without computing it."""
+    """Change of an observed channel if the effect is left out: an upper bound (0: exactly no change) if it is not
+    needed, an estimate if it is needed. None: not known without computing the effect."""
     unit: str = "count"
-    """Unit of `change`."""
+    """Unit of `change`, as text."""
 
 
 class EffectTrack(Protocol):
-    """The recorded channels that share one clock, in the form that effects change."""
+    """Recorded channels with a common clock, in a form that effects can change."""
 
     @property
     def channels(self) -> tuple[ChannelSpec, ...]:
-        """Channels in the order of the sensor's streams."""
+        """Channels on this clock, in the order of the sensor's streams."""
 
     @property
     def t_s(self) -> FloatArray:
-        """(n,) seconds since the recording's first sample."""
+        """(n,) times since the recording's first sample [s]."""
 
     @property
     def force_n(self) -> FloatArray:
-        """(n,) true normal force at these samples."""
+        """(n,) true normal force at the times of the samples [N]."""
 
     @property
     def readings(self) -> FloatArray:
-        """Readings of the channels in their own units, (n, channels), which an effect changes in place."""
+        """Readings, (n, channels), in the units of the channels; an effect changes them in place."""
 
     @property
     def quality(self) -> npt.NDArray[np.uint8]:
-        """Marks of the readings, (n, channels) of :class:`Quality`, which an effect may set."""
+        """Quality of the readings, (n, channels) of :class:`Quality`; an effect may change it."""
 
     def by_kind(self) -> Mapping[ChannelKind, Sequence[int]]:
-        """Return the columns of each kind of channel."""
+        """Return the column numbers of the channels, by kind of channel."""
 
 
 class EffectRun(Protocol):
-    """A recording in the making, which is passed to ``EffectDescriptor.where``.
+    """A simulated recording in progress, passed to ``EffectDescriptor.where``.
 
-    The generators are the same under the same seed and names, whatever other effects draw.
+    The random generators depend on seed and names only, not on the draws of other effects.
     """
 
     @property
     def sensor(self) -> SensorDescriptor:
-        """The sensor, with the nuisances that hold for this scene."""
+        """The sensor, with the nuisances that apply to this scene."""
 
     @property
     def scene(self) -> Scene:
-        """The scene that is carried out."""
+        """The scene that is being simulated."""
 
     @property
     def tracks(self) -> Sequence[EffectTrack]:
-        """The sensor's channels, clock by clock."""
+        """The sensor's channels, grouped by clock."""
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator for draws that hold for this sensor unit in every recording."""
+        """Return the random generator for draws that are constant for this sensor unit, over all recordings."""
 
     def of_session(self, *what: str) -> np.random.Generator:
-        """Return the generator for draws that the recordings of a session share."""
+        """Return the random generator for draws that are common to the recordings of a session."""
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator for draws of this recording only."""
+        """Return the random generator for draws that apply to this recording only."""
 
 
 class Estimator(Protocol):
-    """An estimator with the two methods of scikit-learn."""
+    """An estimator with the methods fit and predict of scikit-learn."""
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Any:
-        """Fit the estimator to features (n, features) and targets."""
+        """Fit the estimator to (n, features) features and their (n,) or (n, components) targets."""
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return predictions for features (n, features)."""
+        """Return one prediction for each row of the (n, features) features."""
 
 
 class Operator(Protocol):
-    """An operator at a rig of real devices."""
+    """The person who operates a rig of real devices."""
 
     def prompt(self, text: str) -> None:
-        """Show what is to be done, and return when it is done; raises RigError if no operator can answer."""
+        """Show an instruction, and return once it is carried out; raise RigError if no operator can answer."""
 
 
 @dataclass(frozen=True)
 class RigContext:
-    """Argument of ``RigDescriptor.where``, which builds a rig."""
+    """Argument of ``RigDescriptor.where``, the function that builds a rig."""
 
     effects: tuple[EffectDescriptor, ...] = ()
-    """The effects of tactbench, which are candidates for every scene."""
+    """Effects of tactbench by name; all are candidates for every scene."""
     named_effects: tuple[EffectDescriptor, ...] = ()
-    """The installed effects of other packages, which are candidates where
-    :func:`tactbench.plugin.simulation.effect_names` has their names."""
+    """Installed effects of other packages, which are candidates if :func:`tactbench.plugin.simulation.effect_names`
+    includes their names."""
     indenters: tuple[IndenterDescriptor, ...] = ()
-    """All installed shapes of indenters; the twin presses with them."""
+    """All installed indenter shapes, which a simulated rig presses on sensors."""
     recordings: Path | None = None
-    """Folder given by ``--recordings``."""
+    """Folder of recordings, from the option ``--recordings``."""
     rig_file: RigFile | None = None
-    """The file given by ``--rig-file``."""
+    """Rig file, from the option ``--rig-file``."""
     operator: Operator | None = None
-    """Operator at the rig; None: there is none."""
+    """The person who operates the rig; None: no person is present."""

@@ -1,8 +1,8 @@
-"""The registry of plugins: each is loaded separately, and every failure is kept as a row.
+"""The registry of plugins: each is loaded separately, and a failure to load one is kept as a row.
 
-A plugin that fails on import stops no other; a name that two plugins give is refused, naming both distributions; a
-misspelt hook is an error. Plugins of other distributions are imported in child processes, which return data: whatever
-an import does to its process has no effect on others.
+A plugin that fails on import does not affect others; a name that two plugins define is refused, with both named; a
+misspelt hook is an error. Plugins of other distributions are imported in child processes, which return data: effects
+of an import on its process do not reach other plugins.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ D = TypeVar("D", bound=Descriptor)
 
 
 class PluginRow(NamedTuple):
-    """An entry point, and whether it could be loaded."""
+    """A plugin's entry point, and the error if it could not be loaded."""
 
     entry_point: str
     module: str
@@ -67,27 +67,27 @@ class Owned(NamedTuple, Generic[D]):
     distribution: str
     version: str
     declared: str = ""
-    """Declaration of a task that came with recordings, as JSON; empty: a plugin defines it."""
+    """JSON declaration of a task that came with recordings; empty: a plugin defines the descriptor."""
 
     @property
     def ours(self) -> bool:
-        """Whether it comes with this package, so that it is tested and can be imported safely."""
+        """True if the plugin is part of this package, and hence safe to import."""
         return _is_built_in(self.module)
 
 
 @dataclass
 class Family(Generic[D]):
-    """All descriptors of one kind by name."""
+    """All descriptors of one kind, such as sensors, by name."""
 
     kind: str
     _found: dict[str, list[Owned[D]]] = field(default_factory=dict)
 
     def add(self, owned: Owned[D]) -> None:
-        """Add a descriptor; a name that is given twice is refused on use."""
+        """Add a descriptor; a name that was added twice is refused on use."""
         self._found.setdefault(owned.descriptor.name, []).append(owned)
 
     def owned(self, name: str) -> Owned[D]:
-        """Return the descriptor called `name` with its owner; raises UnknownNameError or DuplicateNameError."""
+        """Return the descriptor called `name` with its plugin; raise UnknownNameError or DuplicateNameError."""
         if name not in self._found:
             raise UnknownNameError(self.kind, name, self.names())
         if len(self._found[name]) > 1:
@@ -104,15 +104,15 @@ class Family(Generic[D]):
         return (owned.descriptor for owned in self.all_owned())
 
     def all_owned(self) -> list[Owned[D]]:
-        """Return the descriptors whose name is given once, with their owners, sorted by name."""
+        """Return the descriptors whose names are unique, with their plugins, sorted by name."""
         return [owners[0] for _, owners in sorted(self._found.items()) if len(owners) == 1]
 
     def names(self) -> list[str]:
-        """Return the names of these descriptors."""
+        """Return the unique names of the descriptors, sorted."""
         return [descriptor.name for descriptor in self]
 
     def refused(self) -> list[DuplicateNameError]:
-        """Return one error for every name that is given twice."""
+        """Return one error for every name that two or more plugins define."""
         return [self._refusal(name) for name, owners in sorted(self._found.items()) if len(owners) > 1]
 
     def _refusal(self, name: str) -> DuplicateNameError:
@@ -121,7 +121,7 @@ class Family(Generic[D]):
 
 
 class Registry:
-    """Everything that is installed, by kind."""
+    """All installed descriptors, by kind."""
 
     def __init__(self) -> None:
         self.sensors: Family[SensorDescriptor] = Family("sensor")
@@ -135,17 +135,17 @@ class Registry:
         self.plugins: list[PluginRow] = []
 
     def with_tasks(self, tasks: Family[TaskDescriptor]) -> Registry:
-        """Return the registry with other tasks."""
+        """Return the registry with `tasks` in place of its tasks."""
         found = copy(self)
         found.tasks = tasks
         return found
 
     def families(self) -> Mapping[str, Family[Any]]:
-        """Return the families by the plural in the name of their hook."""
+        """Return the groups of descriptors by the plural in the name of their hook, such as ``sensors``."""
         return {name: getattr(self, name) for name in _KINDS}
 
     def first_rig(self, kind: Literal["simulated", "replays"]) -> str:
-        """Return the name of the default rig of a kind: one of ours, or else the first; raises UsageError if none."""
+        """Return a kind's default rig: the first of tactbench, or else any first; raise UsageError if there is none."""
         able = [one for one in self.rigs.all_owned() if getattr(one.descriptor, kind)]
         if not able:
             raise UsageError(f"No rig of kind {kind!r} is installed.", hint="See `tactbench list plugins`.")
@@ -153,23 +153,23 @@ class Registry:
 
     @property
     def failures(self) -> list[PluginRow]:
-        """Plugins that could not be used."""
+        """Plugins that could not be loaded, with their errors."""
         return [row for row in self.plugins if row.status == "failed"]
 
     @property
     def refused(self) -> list[DuplicateNameError]:
-        """Errors for names that are given twice."""
+        """Errors for names that two or more plugins define."""
         return [error for family in self.families().values() for error in family.refused()]
 
 
 _KINDS: dict[str, type[Any]] = {
     f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in get_args(Descriptor)
 }
-"""Classes of descriptors by the plural in hooks and families: ``sensors`` -> SensorDescriptor."""
+"""Classes of descriptors by the plural in the names of hooks: ``sensors`` -> SensorDescriptor."""
 
 
 def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = 20.0) -> Registry:
-    """Load every plugin of the entry-point group, each one separately.
+    """Load every plugin of the entry-point group, each separately from the others.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
     Returns
     -------
     Registry
-        The plugins that could be loaded, and a row for each that could not. No error is raised for a bad plugin.
+        The plugins that could be loaded, and a row for each plugin that could not. A bad plugin raises no error.
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
@@ -195,7 +195,7 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
 
 @cache
 def installed() -> Registry:
-    """Return the registry of this process, loaded once."""
+    """Return the registry of this process; it is loaded at the first call."""
     return load_registry()
 
 
@@ -204,7 +204,7 @@ def _is_built_in(module: str) -> bool:
 
 
 def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: Any) -> None:
-    """Add the descriptors of a plugin, from the `reply` of a child process, or of one of ours directly."""
+    """Add the descriptors of a plugin, from the `reply` of a child process, or imported here if built in."""
     try:
         if isinstance(reply, BaseException):
             raise reply
@@ -223,14 +223,14 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
 
 
 def line_in(module: str, trace: str) -> str:
-    """Return `` (file, line N)`` of the innermost line of a trace in a plugin's own package; empty if there is none."""
+    """Return `` (file, line N)`` of the innermost line of `trace` in a plugin's own package; empty if there is none."""
     package = re.escape(module.partition(".")[0])
     own = re.findall(rf'File "[^"]*/({package}[/.][^"]*)", line (\d+)', trace)
     return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 
 def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) -> dict[tuple[str, str], Any]:
-    """Return the descriptors of each plugin, read in a child process, or the error that stopped it."""
+    """Return the descriptors of each plugin, read in a child process, or the error that prevented reading."""
     if not points:
         return {}
     from tactbench.core.pool import Limits, Pool
@@ -239,7 +239,7 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 
 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
-    """Return the descriptors of a plugin as plain data."""
+    """Return the descriptors of a plugin as plain data, to be sent between processes."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
     found = {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
     for descriptor, dumped in zip(offered.get("sensors", ()), found.get("sensors", ()), strict=True):
@@ -248,7 +248,7 @@ def _describe(point: tuple[str, str]) -> dict[str, Any]:
 
 
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
-    """Return a descriptor as plain data, with the data sheet of a sensor, which recordings and keys leave out."""
+    """Return a descriptor as plain data, including a sensor's data sheet, which recordings and keys omit."""
     dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
     if isinstance(descriptor, SensorDescriptor):
         dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
@@ -260,9 +260,9 @@ def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
 
 
 def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
-    """Import a plugin in this process, and return its checked descriptors by family.
+    """Import a plugin in this process, and return its descriptors by plural of their kind, after checks.
 
-    Raises PluginError if it does not keep the contract of its hooks, and any error of its own code.
+    Raises PluginError if it violates the contract of its hooks, and any error raised in its own code.
     """
     _check_api_version(point.value, _stated_version(point.value))
     module = cast(ModuleType, point.load())
@@ -274,8 +274,8 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     callers = manager.get_hookcallers(module) or []
     if not callers and not _mappings_beside(module):
         raise PluginContractError(
-            f"{point.value} implements none of {', '.join(f'tactbench_{family}' for family in _KINDS)}.",
-            hint="Decorate a function of that name with tactbench.plugin.hookimpl.",
+            f"{point.value} implements no hook of {', '.join(f'tactbench_{family}' for family in _KINDS)}.",
+            hint="Decorate a function that has one of these names with tactbench.plugin.hookimpl.",
         )
     offered: dict[str, list[Any]] = {}
     for caller in callers:
@@ -293,12 +293,12 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 
 
 def _mappings_beside(module: ModuleType) -> bool:
-    """Return whether a package has mappings of data sets: see tactbench.core.recording.datasets."""
+    """Return True if a package has mappings of data sets: see tactbench.core.recording.datasets."""
     return any(any(Path(folder).glob("datasets/*.yaml")) for folder in getattr(module, "__path__", ()))
 
 
 def _stated_version(module: str) -> object:
-    """Return the version that the source of a module states, else this one: its import may fail in another version."""
+    """Return the interface version in a module's source text, by default the current one; importing may fail."""
     origin = getattr(find_spec(module), "origin", None)
     text = Path(origin).read_text(encoding="utf-8", errors="replace") if origin else ""
     found = re.search(r"^TACTBENCH_API\b[^=\n]*=\s*(\d+)", text, re.MULTILINE)
@@ -306,24 +306,24 @@ def _stated_version(module: str) -> object:
 
 
 def _check_api_version(module: str, written_for: object) -> None:
-    """Raise PluginContractError if a plugin states another version of the interface than this one."""
+    """Raise PluginContractError if a plugin was written for another version of the plugin interface."""
     here = hookspecs.API_VERSION
     if written_for == here:
         return
     raise PluginContractError(
-        f"{module} states TACTBENCH_API = {written_for!r}; the plugin interface here is {here}.",
-        hint=f"Write TACTBENCH_API = {here} in it, or update the older of the two: see docs/stability.md.",
+        f"{module} states TACTBENCH_API = {written_for!r}, but this tactbench has version {here} of the interface.",
+        hint=f"Update the older of plugin and tactbench, and state TACTBENCH_API = {here}: see docs/stability.md.",
     )
 
 
 @cache
 def _owner(distribution: Distribution | None) -> tuple[str, str]:
-    """Return the name and the version of a distribution, which are read from a file."""
+    """Return the name and the version of an entry point's distribution, read from its metadata file."""
     return ("unknown", "") if distribution is None else (distribution.name, distribution.version)
 
 
 def load_object(where: str) -> Any:
-    """Return the object that ``module:attribute`` names; raises PluginError if it cannot be imported."""
+    """Return the object at the import path ``module:attribute``; raise PluginError if it cannot be imported."""
     module, _, attribute = where.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)

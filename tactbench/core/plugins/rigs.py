@@ -1,7 +1,7 @@
-"""Building of rigs, with their rig files and the effects that take part.
+"""Building of rigs from their descriptors, rig files and effects.
 
-The effects of this package are candidates for every scene; those of another one only where the sensor's descriptor or
-the scene names them, so that a package that is merely installed is not imported into a run, and stands in no key.
+The effects of this package are candidates for every scene; those of another package only if the sensor's descriptor or
+the scene names them, so that a package that is merely installed is not imported into a run and is in no key.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tactbench.core.spec.scene import Scene
 
 
 def load_rig_file(path: Path, registry: Registry) -> RigFile:
-    """Return the rig file at `path`, its settings checked by the model of its rig where there is one.
+    """Return the rig file at `path`; its settings are checked by the model of its rig, if there is a model.
 
     Raises ConfigError, which names the line, if it is not valid, and UnknownNameError if the rig is not installed.
     """
@@ -41,9 +41,9 @@ def rig_of(
     rig_file: RigFile | None = None,
     operator: Operator | None = None,
 ) -> Rig | ReplayRig:
-    """Return the rig called `name`.
+    """Return the rig called `name`, built with its rig file.
 
-    Raises UsageError if the rig file is for another one, and RigError if its own code fails.
+    Raises UsageError if the rig file is for another rig, and RigError if the rig's own code fails.
     """
     descriptor = registry.rigs[name]
     if rig_file is not None:
@@ -56,31 +56,31 @@ def rig_of(
 
 @contextmanager
 def failing_as(what: str) -> Iterator[None]:
-    """Return a context that turns other errors of a rig's own code into RigError, whose message begins with `what`."""
+    """Return a context that converts other errors of a rig's code to RigError with a message starting with `what`."""
     try:
         yield
     except TactbenchError:
         raise
     except (Exception, SystemExit) as error:
-        raise RigError(f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for its plugin.") from error
+        raise RigError(f"{what}: {error_text(error)}.", hint="`tactbench list plugins` names its plugin.") from error
 
 
 def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:
-    """Return the effects that are candidates for a scene with a sensor, with their owners, sorted by name."""
+    """Return the effects that are candidates for a scene with a sensor, with their plugins, sorted by name."""
     named = effect_names(sensor, scene)
     return [one for one in registry.effects.all_owned() if one.ours or one.descriptor.name in named]
 
 
 def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
-    """Return the names of effects and of groups of effects in the sensor's descriptor and in the scene.
+    """Return the names of effects, and of groups of effects, that the sensor's descriptor and the scene contain.
 
-    A simulated rig considers those of its context's `named_effects` that are among them.
+    Of its context's `named_effects`, a simulated rig considers only the effects with such names.
     """
     return {*sensor.effects, *(word.lstrip("+-") for word in scene.simulation.effects)}
 
 
 def rig_context(registry: Registry, **given: Any) -> RigContext:
-    """Return the context of a rig: the registry's effects and indenters, and the fields `given`."""
+    """Return the context for building a rig: the registry's effects and indenters, and the fields `given`."""
     owned = registry.effects.all_owned()
     return RigContext(
         effects=tuple(one.descriptor for one in owned if one.ours),

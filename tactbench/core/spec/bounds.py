@@ -1,9 +1,9 @@
-"""Upper bounds of the numbers of a run; a larger number is a typing error, and would overflow or never end."""
+"""Upper bounds of the numbers in the settings of a run; a larger number is a typing error, and would overflow."""
 
 MOST_REPEATS = 1000
-"""Largest number of replicates: each is recorded anew, and the interval of so many is already within 6 % of their
-spread."""
+"""Largest number of replicates. Each is recorded anew; the 95 % interval of the mean of this many is already within 6 %
+of their standard deviation."""
 MOST_SECONDS = 366 * 86400.0
-"""Largest time limit [s]: a year."""
+"""Largest time limit of a cell or a recording [s]: a year."""
 MOST_MEMORY_MB = 2**30
-"""Largest memory limit [MB]: a pebibyte."""
+"""Largest memory limit of a cell or a recording [MB of 2**20 bytes]: a pebibyte."""

@@ -11,32 +11,32 @@ from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, TaskFields, TaskSpec, VectorTarget
 
 FILE = "tasks.yaml"
-"""Name of the file of these tasks beside the recordings."""
+"""Name of the file beside recordings in which such tasks are declared."""
 
 _METRICS = {
     "number": ("rmse", "mae", "r2"), "vector": (VECTOR_METRIC,), "class": ("macro_f1", "accuracy", "balanced_accuracy"),
 }  # fmt: skip
-"""Metrics of each kind of answer, the default first."""
+"""Metrics by kind of answer; the first of each kind is the default."""
 _ESTIMATORS = {"number": ("forest", "ridge"), "vector": ("forest-100", "ridge"), "class": ("forest", "logistic")}
 _BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index"), "class": ("majority", "chance")}
 
 
 class DeclaredTask(TaskFields):
-    """A task as a mapping declares it; what it leaves out follows from the target and the name."""
+    """A task as a mapping file declares it; omitted fields follow from the target and the name."""
 
     target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
     answer: Literal["number", "class"] | None = None
-    """Whether a label is a number or, by default, a class; None for a channel."""
+    """Type of a label's values: a class (default) or a number; None if the target is a channel."""
     metric: str | None = None
-    """Metric; None: the first that fits the target."""
+    """Name of the metric; None: the first metric that fits the target."""
     splits: tuple[str, ...] = Field(min_length=1)
     """Splits, the default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
     answer_per: Literal["sample", "recording"] = "sample"
     protocols: tuple[str, ...] = Field(default=("deployable",), min_length=1)
     estimators: tuple[str, ...] = ()
-    """Names of estimators; empty: two that fit the target."""
+    """Names of estimators; empty: two estimators that fit the target."""
     baselines: tuple[str, ...] = ()
-    """Names of trivial estimators; empty: the usual ones."""
+    """Names of trivial estimators; empty: the usual trivial estimators for the target."""
     equivalence: float | None = Field(default=None, ge=0)
 
     @property
@@ -48,9 +48,9 @@ class DeclaredTask(TaskFields):
     @model_validator(mode="after")
     def _makes_a_task(self) -> DeclaredTask:
         if self.answer is not None and not isinstance(self.target, LabelTarget):
-            raise ValueError("answer: class or number is for labels; a channel is a number")
+            raise ValueError("answer: give class or number for a label only; a channel is always a number")
         if self.metric is not None and self.metric not in _METRICS[self._answer]:
-            raise ValueError(f"a {self._answer} is scored by {', '.join(_METRICS[self._answer])}, not by {self.metric}")
+            raise ValueError(f"metrics of a {self._answer} are {', '.join(_METRICS[self._answer])}, not {self.metric}")
         try:
             self.spec  # noqa: B018  (a task that is not valid is refused in the file that declares it)
         except ValidationError as error:
@@ -59,7 +59,7 @@ class DeclaredTask(TaskFields):
 
     @property
     def spec(self) -> TaskSpec:
-        """The same task as a plugin would declare it."""
+        """Return the task as the specification that a plugin would declare."""
         answer, metric = self._answer, self.metric or _METRICS[self._answer][0]
         unit = self.target.unit if metric in ("rmse", "mae", VECTOR_METRIC) else "1"
         more: dict[str, Any] = {
@@ -71,7 +71,7 @@ class DeclaredTask(TaskFields):
 
 
 class TaskFile(Frozen):
-    """Content of the file :data:`FILE`."""
+    """Content of a file of declared tasks, :data:`FILE`."""
 
     version: Literal[1] = 1
     tasks: tuple[DeclaredTask, ...] = ()

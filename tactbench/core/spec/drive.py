@@ -12,8 +12,8 @@ _PAPER_LOOP = "Karl et al. 2016 state a low-pass filter in the loop; neither con
 class ForceLoop(Frozen):
     """A force loop around a position-controlled linear motor.
 
-    Once per step, the force is read and filtered, and a proportional-integral controller on its difference from the
-    profile commands the motor's position. The defaults are plausible; the paper states none of them.
+    Once per step, the force is read and filtered, and a proportional-integral controller turns its difference from
+    the profile into a position command. The defaults are plausible; the paper states none of them.
     """
 
     kind: Literal["force loop"] = "force loop"
@@ -24,18 +24,18 @@ class ForceLoop(Frozen):
     cutoff: Quantity | None = assumed(1.0, "Hz", f"{_PAPER_LOOP}: no cut-off either")
     """Cut-off of the first-order low-pass on the measured force [1/time]; None: there is no filter."""
     rate: Quantity | None = None
-    """Rate of the loop [1/time]; None: that of the reference clock."""
+    """Rate of the control loop [1/time]; None: the rate of the reference clock."""
     delay: Quantity = assumed(
         10.0, "ms", "RS232, as the paper says, at 9600 baud: a command and its answer of 9 to 10 bytes of 10 bits"
     )
-    """Time from reading the force to the motor's receiving the command [time], rounded up to whole steps."""
+    """Time between reading the force and the arrival of the command at the motor [time], rounded up to whole steps."""
     motor_lag: Quantity = assumed(10.0, "ms", "closed position loop of a small linear motor; no source")
     """Time constant with which the motor approaches a commanded position [time]."""
     speed: Quantity = assumed(50.0, "mm/s", "small linear motors reach metres per second; set low for pressing")
-    """Largest speed [length / time]."""
+    """Largest speed of the motor [length / time]."""
     acceleration: Quantity = assumed(1000.0, "mm/s/s", "a tenth of gravity; drives allow it to be set")
-    """Largest acceleration [length / time^2]."""
+    """Largest acceleration of the motor [length / time^2]."""
     resolution: Quantity = derived(
         0.02, "N", "12 bits on +-10 V of a Nano17 with 3.7 N/V in its worst gauge, upper end of 8 to 20 mN"
     )
-    """Step of the measured force [force]."""
+    """Resolution of the force measurement [force]."""

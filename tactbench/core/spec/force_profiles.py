@@ -1,4 +1,4 @@
-"""Force profiles by name: a staircase, a held press and a sine. Their forces are in N, times in s and rates in Hz."""
+"""Named force profiles: a staircase, a held press and a sine. Forces are in N, times in s and rates in Hz."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from tactbench.core.spec.profile import ForcePath
 from tactbench.core.spec.quantity import Source
 
 PER_PERIOD = 64
-"""Points of a period of a sine; the straight lines between them are off by ``1 - cos(pi/64)``, 0.12 % of its
-amplitude."""
+"""Number of points for each period of a sine; the straight lines between them deviate by at most ``1 - cos(pi/64)``,
+0.12 % of the amplitude."""
 
 
 def staircase(
@@ -22,14 +22,14 @@ def staircase(
     hold: float = 3.0,
     rate: float = 100.0,
 ) -> ForcePath:
-    """Return a path with equal steps up to a force and down again, as for a calibration curve with hysteresis.
+    """Return a path of equal steps up to a peak force and down again, as for a calibration curve with hysteresis.
 
     Parameters
     ----------
     peak, steps
-        Force of the highest level [N], and the number of levels above zero: a whole one, or UsageError is raised.
+        Force of the highest level [N], and the number of levels above zero; UsageError unless it is whole.
     dwell, rise, hold
-        Times at each level, for each step (above 0), and without load before the first step [s].
+        Durations of each level, of each step between levels (above 0), and of the unloaded start [s].
     rate
         Rate of the reference clock [Hz].
     """
@@ -48,7 +48,7 @@ def press_hold_release(
     hold: float = 3.0,
     rate: float = 100.0,
 ) -> ForcePath:
-    """Return a path with one press that is held and released, which shows creep and recovery.
+    """Return a path with one press that is held and then released, which shows creep and recovery.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def press_hold_release(
     rise, dwell, release
         Times of pressing (above 0), of holding the force, and of releasing (above 0) [s].
     rest, hold
-        Times without load after and before the press [s].
+        Durations of the unloaded end (`rest`) and start (`hold`) of the path [s].
     rate
         Rate of the reference clock [Hz].
     """
@@ -74,16 +74,16 @@ def sine(
     hold: float = 3.0,
     rate: float = 200.0,
 ) -> ForcePath:
-    """Return a path in which the force swings about a mean, beginning and ending at its lowest.
+    """Return a path in which the force oscillates as a sine about a mean, beginning and ending at its lowest value.
 
-    It runs straight between 64 points a period, by which it is off by up to 0.12 % of the amplitude.
+    It is linear between 64 points of each period, which deviates by up to 0.12 % of the amplitude from a sine.
 
     Parameters
     ----------
     mean, amplitude
         Mean of the force, and amplitude of the swing [N]. UsageError is raised if the amplitude exceeds the mean.
     frequency, periods
-        Frequency [Hz], and the number of periods: a whole one, or UsageError is raised.
+        Frequency [Hz], and the number of periods: UsageError unless it is whole.
     rise, hold
         Time from zero to the lowest force (above 0), and without load before [s].
     rate
@@ -91,9 +91,9 @@ def sine(
     """
     if amplitude > mean:
         raise UsageError(
-            f"The profile 'sine': amplitude is given as {amplitude:g} N, and at most its mean, {mean:g} N, is "
+            f"The profile 'sine': amplitude is given as {amplitude:g} N, and at most the mean force, {mean:g} N, is "
             "expected.",
-            hint="An indenter cannot pull.",
+            hint="Give a smaller amplitude or a larger mean: an indenter cannot pull.",
         )
     points = _whole("sine", "periods", periods) * PER_PERIOD
     step = 1.0 / (frequency * PER_PERIOD)
@@ -102,16 +102,16 @@ def sine(
 
 
 def _whole(profile: str, name: str, given: float) -> int:
-    """Return `given` as a count; raises UsageError if it is no whole number from 1 on."""
+    """Return the parameter `given` as an integer; raise UsageError unless it is a whole number of at least 1."""
     if given < 1 or given != int(given):
         raise UsageError(
-            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number from 1 on is expected."
+            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number, 1 or more, is expected."
         )
     return int(given)
 
 
 def _path(name: str, rate_hz: float, *spans: tuple[float, float]) -> ForcePath:
-    """Return the path from 0 N over `spans`: the duration of each [s], and the force at its end [N]."""
+    """Return a path from 0 N over `spans`, each given as its duration [s] and the force at its end [N]."""
     times, forces = [0.0], [0.0]
     for span, force in spans:
         if span > 0 or force != forces[-1]:  # ForcePath refuses a force that jumps

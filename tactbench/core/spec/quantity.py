@@ -10,11 +10,11 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
 Tag = Literal["sourced", "measured", "derived", "assumed"]
-"""Trust in a fact: stated in a document, measured on real devices, derived from other facts, or assumed."""
+"""Trust in a value: stated in a document, measured on real devices, derived from other values, or assumed."""
 
 
 class Frozen(BaseModel):
-    """An immutable model without unknown fields, and without NaN and infinity except in quantities."""
+    """An immutable model, which refuses unknown fields; NaN and infinity are refused except in quantities."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
@@ -25,27 +25,27 @@ def _known(unit: str) -> str:
 
 
 Unit = Annotated[str, AfterValidator(_known)]
-"""Name of a unit of :mod:`tactbench.core.spec.units`."""
+"""Name of a unit, for example ``mm`` or ``N/mm``, from :mod:`tactbench.core.spec.units`."""
 
 
 class Source(Frozen):
-    """Source of a fact; a fact that is `assumed` has none, and is treated as a parameter."""
+    """Source of a value; an `assumed` value has no source, and is treated as a parameter."""
 
     tag: Tag
     reference: str
-    """Document, file, or reason of an assumption."""
+    """Document or file that states the value, or the reason for an assumption."""
 
 
 class Quantity(Frozen):
-    """A number with its unit and its source."""
+    """A number with its unit and the source of its value."""
 
     value: float = Field(allow_inf_nan=True)
-    """The number as the source states it: a flat surface has an infinite radius."""
+    """The number as the source states it; infinity is allowed, as for the radius of a flat surface."""
     unit: Unit
     source: Source
 
     def to(self, unit: str) -> float:
-        """Return the number in `unit`; raises UsageError when the dimensions differ."""
+        """Return the number converted to `unit`; raise UsageError if the dimensions differ."""
         return self.value * units.conversion(self.unit, unit)
 
     def __str__(self) -> str:
@@ -53,7 +53,7 @@ class Quantity(Frozen):
 
 
 def _measuring(unit: str) -> AfterValidator:
-    """Return a validator that refuses a quantity which cannot be converted to `unit`."""
+    """Return a pydantic validator that refuses a quantity which cannot be converted to `unit`."""
 
     def checked(given: Quantity) -> Quantity:
         try:
@@ -70,7 +70,7 @@ Mass = Annotated[Quantity, _measuring("kg")]
 Power = Annotated[Quantity, _measuring("W")]
 Pressure = Annotated[Quantity, _measuring("MPa")]
 Stiffness = Annotated[Quantity, _measuring("MPa/mm")]
-"""A pressure for each length."""
+"""A quantity with the dimension of pressure / length."""
 Tension = Annotated[Quantity, _measuring("N/mm")]
 BendingStiffness = Annotated[Quantity, _measuring("N*mm")]
 Time = Annotated[Quantity, _measuring("s")]
@@ -78,20 +78,20 @@ Share = Annotated[Quantity, _measuring("1")]
 
 
 def sourced(value: float, unit: str, reference: str) -> Quantity:
-    """Return a quantity that a document states."""
+    """Return a quantity that is stated in the document `reference`."""
     return Quantity(value=value, unit=unit, source=Source(tag="sourced", reference=reference))
 
 
 def measured(value: float, unit: str, reference: str) -> Quantity:
-    """Return a quantity that was measured on real devices."""
+    """Return a quantity that was measured on real devices, as `reference` states."""
     return Quantity(value=value, unit=unit, source=Source(tag="measured", reference=reference))
 
 
 def derived(value: float, unit: str, reference: str) -> Quantity:
-    """Return a quantity that is computed from others; `reference` states how."""
+    """Return a quantity computed from other quantities; `reference` states the computation."""
     return Quantity(value=value, unit=unit, source=Source(tag="derived", reference=reference))
 
 
 def assumed(value: float, unit: str, reference: str) -> Quantity:
-    """Return a quantity that no source states; `reference` gives the reason for its value."""
+    """Return a quantity for which there is no source; `reference` gives the reason for its value."""
     return Quantity(value=value, unit=unit, source=Source(tag="assumed", reference=reference))

@@ -1,4 +1,4 @@
-"""The row of a cell: names, types and meaning of all its keys."""
+"""The row of a cell: names, types and meanings of all its keys."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from pydantic import BaseModel, ConfigDict
 
 Status = Literal["done", "failed", "crashed", "timeout", "out-of-memory", "skipped"]
 STATUSES: tuple[Status, ...] = get_args(Status)
-"""Statuses of a cell: every planned cell ends as one row with one of them."""
+"""Statuses of a cell: every planned cell ends as one row that has one of these statuses."""
 STOPPED: frozenset[Status] = frozenset({"failed", "crashed", "timeout", "out-of-memory"})
-"""Statuses of cells that failed; one of them makes the exit code 1."""
+"""Statuses of failed cells; a cell with such a status makes the exit code 1."""
 
 TRUE = "true_"
-"""Prefix of the names of metrics against the force that a simulated rig exerted."""
+"""Prefix of the names of metrics that compare with the true force that a simulated rig exerted."""
 DIRECTIONS = (" (lower is better)", " (higher is better)")
-"""Suffixes of the name of a caller's own metric."""
+"""Suffixes of the name of a user's own metric, by whether a lower or a higher value is better."""
 
 
 def lower_is_better(metric: str) -> bool:
-    """Return whether a metric of a row's score is an error."""
+    """Return True if a metric of a row's score is an error, for which lower is better."""
     errors = ("rmse", "mae", "mean_euclidean_error", "excess_square")
     return metric.removeprefix(TRUE) in errors or metric.endswith(DIRECTIONS[0])
 
 
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
-"""Keys of `scores` beside the mean error of a vector: percentiles over the test rows."""
+"""Keys of `scores` for vectors beside their mean error: percentiles of the error over the test rows."""
 
 LEAKS = "leaks: "
-"""Prefix of stamps on a score that training data have leaked into."""
+"""Prefix of remarks on a score whose training data leak into its test data."""
 
 
 def plural(unit: str) -> str:
-    """Return the name of several units of replication."""
+    """Return the plural of the name of a unit of replication."""
     return unit + ("es" if unit.endswith("s") else "s")
 
 
@@ -42,7 +42,7 @@ class _Section(BaseModel):
 
 
 class Asked(_Section):
-    """The question: sensor, task, rig, protocol, split and estimator."""
+    """Keys that identify a cell: sensor, task, rig, protocol, split and estimator."""
 
     cell: str
     sensor: str = ""
@@ -63,7 +63,7 @@ class Asked(_Section):
 
 
 class Ended(_Section):
-    """The way in which the cell ended."""
+    """Status of a cell, and the reason for it."""
 
     status: Status
     reason: str = ""
@@ -73,45 +73,45 @@ class Ended(_Section):
 
 
 class Scored(_Section):
-    """The score, and the amount of data behind it."""
+    """The score, and the amount of data from which it was computed."""
 
     metric: str = ""
     unit: str = ""
     equivalence: float | None = None
     score: float | None = None
     ci_low: float | None = None
-    """lower end of the interval; None: there are too few units for one"""
+    """lower end of the score's interval; None: there are too few units for an interval"""
     ci_high: float | None = None
-    """upper end; None, beside a `ci_low`: the data bound an error from below only"""
+    """upper end of the score's interval; None beside a `ci_low`: the data bound an error from below only"""
     ci_method: str = ""
     reference_floor: float | None = None
-    """noise of the reference, for an error of force; None where that is not known"""
+    """noise of the reference, for a score that is an error of force; None: not known"""
     reference_floor_se: float | None = None
-    """standard error of that floor"""
+    """standard error of `noise_floor`"""
     score_beyond_floor: float | None = None
     beyond_floor_ci_low: float | None = None
     beyond_floor_ci_high: float | None = None
     true_score: float | None = None
-    """the metric against the force that was exerted; None where that is not known"""
+    """the metric against the true force of a simulated rig; None: not known"""
     true_ci_low: float | None = None
     true_ci_high: float | None = None
     tare_s: float | None = None
-    """seconds of unloaded hold that each recording was tared on, the shortest of all; None: none was tared"""
+    """shortest unloaded time at the start of a recording over which it was tared [s]; None: no recording was tared"""
     baseline: float | None = None
     published: float | None = None
     published_reference: str = ""
     published_remark: str = ""
     n_recordings: int | None = None
-    """recordings that some fold uses; n_sessions and n_specimens alike"""
+    """number of recordings that are in any fold; `n_sessions` and `n_specimens` count the same way"""
     n_sessions: int | None = None
     n_specimens: int | None = None
-    """devices, by the label `unit`; None where a recording has none"""
+    """number of devices, by the label `unit`; None: a recording lacks the label"""
     n_train: int | None = None
     n_test: int | None = None
 
 
 class Cost(_Section):
-    """Times and memory of the cell. Numbers that need single answers are None where these were not timed."""
+    """Times and memory of the cell. Keys that need single predictions are None if these were not timed."""
 
     sim_s: float | None = None
     search_s: float | None = None
@@ -120,13 +120,13 @@ class Cost(_Section):
     batch_rows: int | None = None
     latency_ms_p50: float | None = None
     latency_ms_p95: float | None = None
-    """95th percentile; None also where fewer than 200 calls were measured"""
+    """95th percentile; None also for fewer than 200 measured calls"""
     latency_ms_max: float | None = None
     latency_n: int | None = None
     answer_delay_ms: float | None = None
-    """sum of the parts; None also where one other than the link is not known"""
+    """sum of the parts; None also if a part other than the link is not known"""
     delay_parts_ms: dict[str, float] = {}
-    """known parts of the answer delay: sampling, link, window, features, prediction"""
+    """known parts of the delay of an answer [ms]: sampling, link, window, features, prediction"""
     threads: int | None = None
     peak_rss_mb: float | None = None
     wall_s: float | None = None
@@ -136,42 +136,42 @@ class Cost(_Section):
 
 
 class RestsOn(_Section):
-    """The data, assumptions and choices behind the score."""
+    """Data, assumptions and choices on which the score depends."""
 
     simulated: bool = False
     emulated: bool = False
     dagger: bool = False
     stamps: list[str] = []
     findings: list[str] = []
-    """findings in recordings that bear on the score, data that were left out, classes without training data"""
+    """findings in the recordings that affect the score, data left out, classes without training data"""
     remarks: list[str] = []
-    """remarks of recordings, and reasons for what could not be done"""
+    """remarks of the recordings, and reasons for evaluations that were not possible"""
     assumptions: dict[str, Any] = {}
     plan: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
-    """counts of what was left out, by reason"""
+    """numbers of items left out, by reason"""
     chosen: dict[str, float] = {}
     search: list[dict[str, Any]] = []
-    """candidates that were compared on validation data: parameters, k, score and fold"""
+    """candidates compared on validation data: parameters, k, score and fold"""
     digests: list[str] = []
     scores: dict[str, float] = {}
-    """other metrics: the score on validation data, of each fold and of each class"""
+    """other metrics: the score on validation data, for each fold and for each class"""
     fold_sizes: dict[str, list[int]] = {}
-    """training and test rows of each fold, by its name in `scores`"""
+    """numbers of training and test rows of each fold, by its name in `scores`"""
     confusion: list[list[int]] | None = None
-    """counts of answers, (true class, predicted class)"""
+    """numbers of answers for each pair (true class, predicted class)"""
     classes: list[str | bool | int | float] = []
     events: dict[str, float] = {}
-    """figures of events, times in the unit of the name"""
+    """figures of events by name; times are in the unit in the name"""
     operating_points: list[dict[str, float]] = []
-    """the same figures at thresholds that validation recordings give for several bounds of false alarms"""
+    """the figures of `events` at other thresholds, each for another bound of false alarms in validation"""
     recordings: list[str] = []
     replicates: dict[str, Any] = {}
-    """the primary metric's sums over each replicate; see replicate_sums"""
+    """sums of the primary metric over each replicate; see replicate_sums"""
 
 
 class Evaluated(RestsOn, Cost, Scored):
-    """Keys that the evaluation of a cell gives."""
+    """Keys of the row that the evaluation of a cell adds."""
 
 
 class RowModel(Evaluated, Ended, Asked):
@@ -182,11 +182,11 @@ class RowModel(Evaluated, Ended, Asked):
 
 
 class ReplicatedRow(RowModel):
-    """The row of several replicates of a cell, as tables show it, with the keys that a file adds."""
+    """The row of several replicates of a cell, as tables show it, with the additional keys of a JSON file."""
 
     key: str = ""
     repeats: int | None = None
-    """replicates that ended, in whatever way"""
+    """number of replicates that ended, with any status"""
     n_replicates: int | None = None
     replicate_unit: str | None = None
     replicate_scores: list[float] | None = None
@@ -194,15 +194,15 @@ class ReplicatedRow(RowModel):
     score_min: float | None = None
     score_max: float | None = None
     reference_score: float | None = None
-    """score against the reference as it was recorded, where `score` is against the true force"""
+    """score against the recorded reference, if `score` is against the true force"""
     reference_ci_low: float | None = None
     reference_ci_high: float | None = None
     reference_scores: list[float] | None = None
-    """the same for each replicate"""
+    """`recorded_score` of each replicate"""
 
 
 def _types(annotation: Any) -> frozenset[type]:
-    """Return the types of the members of a union, or of another annotation; a float may be an int."""
+    """Return the types of a union's members, or the single type of another annotation; int is added to float."""
     is_union = get_origin(annotation) not in (None, list, dict, Literal)
     members = get_args(annotation) if is_union else (annotation,)
     found = {str if get_origin(one) is Literal else get_origin(one) or one for one in members}
@@ -212,14 +212,14 @@ def _types(annotation: Any) -> frozenset[type]:
 FORMAT: Mapping[str, frozenset[type]] = {
     name: _types(field.annotation) for name, field in ReplicatedRow.model_fields.items()
 }
-"""Types of the values of each key. A row may have other keys, whose values are not checked."""
+"""Types of the values by key. A row may have other keys, whose values are not checked."""
 
 _ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
-"""Keys that are large, or of no use to a program; `why`, the page and the cell's own file have them."""
+"""Keys that are too large for, or of no use to, a program; the page, `why` and the cell's own file contain them."""
 _OF_CELL = [key for key in RowModel.model_fields if key not in _ELSEWHERE]
 JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
-"""Keys of a JSON row, in order."""
+"""Keys of a JSON row in their order."""
 OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
-"""Keys that follow in a row for all replicates of a cell."""
+"""Additional keys of a row that stands for all replicates of a cell."""
 NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
-"""Keys whose values are lists or tables, which are JSON inside a cell of CSV and Parquet."""
+"""Keys whose values are lists or tables; in CSV and Parquet, such a value is JSON in one cell."""

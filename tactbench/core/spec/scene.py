@@ -23,26 +23,26 @@ from tactbench.core.spec.quantity import Frozen, Quantity, assumed, measured, so
 from tactbench.core.spec.sensor import ChannelKind, ranges
 
 Role = Literal["train", "validation", "test"]
-"""Role of a recording in a task."""
+"""Role of a recording in a task, as training or test data."""
 
 
 class Indenter(Frozen):
-    """The body that is pressed on the sensor: flat, a spherical cap, or of a shape that a plugin defines."""
+    """The body pressed on the sensor: flat, a spherical cap, or a shape from a plugin."""
 
     radius: Quantity | None = None
     """Radius of the cap [length]; None: the surface is flat or of another shape."""
     shape: str | None = None
-    """Name of an installed shape (``tactbench list indenters``); None, ``cap``, ``flat``: a cap if there is a radius,
-    else flat."""
+    """Name of an installed shape (``tactbench list indenters``). None, ``cap`` or ``flat``: a cap if a radius is given,
+    else a flat surface."""
     dimensions: dict[str, Quantity] = Field(default_factory=dict)
-    """Dimensions of the shape by name; the others have their defaults."""
+    """Dimensions of the shape by name; omitted dimensions have their defaults."""
     angle: Quantity = assumed(0.0, "deg", "the shape's own axes are those of the sensor")
-    """Rotation of the shape about the press axis, from x towards s [angle]."""
+    """Rotation of the indenter's shape about the press axis, from x towards s [angle]."""
 
     @model_validator(mode="before")
     @classmethod
     def _cap_and_flat(cls, given: Any) -> Any:
-        """Return an indenter with the shapes cap and flat as a radius, so that each body is stored in one way."""
+        """Return the indenter in its stored form, in which caps and flat surfaces are given by the radius alone."""
         if not isinstance(given, Mapping) or given.get("shape") not in ("cap", "flat"):
             return given
         own, dimensions = dict(given), dict(given.get("dimensions") or {})
@@ -50,22 +50,22 @@ class Indenter(Frozen):
         if is_cap:
             own.setdefault("radius", dimensions.pop("radius", None))
         if is_cap == (own.get("radius") is None):
-            raise ValueError("radius: a cap has one, and a flat surface none")
+            raise ValueError("radius: the shape cap needs a radius, and the shape flat takes no radius")
         return {**own, "dimensions": dimensions}
 
     @model_validator(mode="after")
     def _is_one_body(self) -> Indenter:
         if self.shape is not None and self.radius is not None:
-            raise ValueError(f"radius: only a cap has one; give the dimensions of {self.shape!r} under dimensions")
+            raise ValueError(f"radius: only a cap has a radius; {self.shape!r} is sized by `dimensions`")
         if self.shape is None and self.dimensions:
-            raise ValueError(f"dimensions: {self} has none of {', '.join(self.dimensions)}; name a shape")
+            raise ValueError(f"dimensions: {', '.join(self.dimensions)} given for {self}, which has none; give `shape`")
         if self.angle.to("rad") and self.shape is None:
-            raise ValueError(f"angle: {self.angle} is given, and {self} is the same from all sides")
+            raise ValueError(f"angle: {self.angle} is given, and {self} has rotational symmetry; leave `angle` out")
         return self
 
     @model_serializer(mode="wrap")
     def _stored_form(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the stored form: caps and flat surfaces have a radius only, as in earlier recordings."""
+        """Return the stored form: caps and flat surfaces are given by a radius only, as in earlier recordings."""
         stored: dict[str, Any] = serialize(self)
         return stored if self.shape is not None else {"radius": stored["radius"]}
 
@@ -78,90 +78,90 @@ class Indenter(Frozen):
 
 
 class Placement(Frozen):
-    """Place at which the indenter meets the sensor, relative to the sensor's nominal point of contact."""
+    """Position and tilt of the indenter relative to the sensor's nominal point of contact."""
 
     x: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
-    """Axial offset [length]."""
+    """Offset of the indenter along the finger's axis [length]."""
     s: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
-    """Offset along the arc [length]."""
+    """Offset of the indenter along the arc of the skin [length]."""
     scatter: Quantity = assumed(
         0.1, "mm", "repeatability of exchanging a cap; no source states it: docs/calibration.md draws it from a prior"
     )
-    """Standard deviation of both offsets from recording to recording [length]."""
+    """Standard deviation of both offsets between recordings [length]."""
     tilt_x: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
-    """Slope of the indenter along the finger [angle]; positive: it stands further off towards the tip."""
+    """Slope of the indenter along the finger [angle]; if positive, the gap is wider towards the tip."""
     tilt_s: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
-    """Slope of the indenter across the finger [angle]."""
+    """Slope of the indenter across the finger, along the arc [angle]."""
     tilt_scatter: Quantity = assumed(
         0.0, "deg", "no source states how an exchanged cap tilts; `RANGES` has what may be"
     )
-    """Standard deviation of both slopes from recording to recording [angle]."""
+    """Standard deviation of both slopes between recordings [angle]."""
 
 
 class Environment(Frozen):
-    """Surroundings of the contact, and factors on the assumed nuisances."""
+    """Surroundings of the contact, and factors that scale the assumed noise and drift."""
 
     since_power_on: Quantity = assumed(
         3600.0, "s", "an hour: warm; the paper does not say: docs/calibration.md draws it from a prior"
     )
-    """Time from switching the sensor on to the first sample of the session [time]."""
+    """Time from switching the sensor on to the session's first sample [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
-    """Factor on the white noise of the sensor; docs/calibration.md has those that agree with the paper's figures."""
+    """Factor on the white noise of the sensor; docs/calibration.md has factors that fit the paper's figures."""
     drift_scale: float = Field(default=1.0, ge=0)
-    """Factor on wander and warm-up, and on offsets where these have no factor of their own."""
+    """Factor on slow drift and warm-up, and on the offsets that have no factor of their own."""
     offset_scale: float | None = Field(default=None, ge=0)
-    """Factor on the offsets between recordings of a session; None: the factor of drift."""
+    """Factor on the offsets between recordings of a session; None: the same factor as for drift."""
     session_offset_scale: float = Field(default=0.0, ge=0)
-    """Factor on the offsets between sessions; 0: sessions follow each other on one warm set-up, as in the paper."""
+    """Factor on the offsets between sessions; 0: all sessions share one warm set-up, as in the paper."""
     force_noise: Quantity = sourced(
         0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
     )
-    """Standard deviation of the unfiltered force-torque sensor [force]."""
+    """Standard deviation of the noise of the force-torque sensor, without a filter [force]."""
     force_filter: Quantity | None = None
-    """Cut-off of a low-pass on the recorded force [1/time]; None: it is recorded unfiltered, as in the paper."""
+    """Cut-off of a low-pass filter on the recorded force [1/time]; None: no filter, as in the paper."""
     ambient: Quantity = assumed(23.0, "degC", "a laboratory; the paper does not say")
     """Temperature of the room [degC]."""
     indenter_temperature: Quantity | None = None
-    """Temperature of the indenter [degC]; None: that of the surface which it touches, so that no heat flows. No source
-    states it; a cap may have the temperature of the room."""
+    """Temperature of the indenter [degC]; None: that of the surface it touches, so that no heat flows. No source states
+    the temperature; a cap may be as warm as the room."""
 
     @property
     def scale_of_offsets(self) -> float:
-        """Factor on the offsets between recordings [1]."""
+        """Factor on the offsets between recordings of a session [1]."""
         return self.drift_scale if self.offset_scale is None else self.offset_scale
 
 
 class Surface(Frozen):
-    """Friction and roughness of the surface that slides over the skin."""
+    """Friction and roughness of the indenter's surface, which slides over the skin."""
 
     static_friction: Quantity = sourced(
         0.7834, "1", "NVlabs/biotac_sim, sim_biotac.py: default coefficient for a BioTac, read as the static one"
     )
-    """Largest tangential over normal force before everything slips [1]."""
+    """Ratio of tangential to normal force above which the whole contact slips [1]."""
     kinetic_friction: Quantity = assumed(0.65, "1", "a sixth below the static coefficient; no source for this skin")
     """Ratio of tangential to normal force at speeds far above `stribeck_speed` [1]."""
     stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
-    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb)."""
+    """Speed over which friction falls from static to kinetic [speed]; 0: the fall is immediate (Coulomb)."""
     roughness: Quantity = measured(
         73.0,
         "um",
         "set so that PAC holds 110 counts (rms) between 2 and 30 Hz, the median of dexrob/BioTac_slide_20_50, in one "
         "simulated slide: cap R 20 mm, 0.5 N, 50 mm/s, all three assumed",
     )
-    """Root mean square of the profile [length]."""
+    """Root mean square of the roughness profile [length]."""
     roll_off: Quantity = assumed(
         1.0, "mm", "some tenths of a millimetre and more, by surface: Persson et al. 2005; none known of what slides"
     )
-    """Wavelength below which the profile is self-affine, and above which its spectrum is even [length]."""
+    """Wavelength below which the roughness is self-affine, and above which its spectrum is constant [length]."""
     hurst: Quantity = assumed(
         0.8, "1", "0.7 to 0.9 for most surfaces; Persson et al. 2005, J. Phys.: Condens. Matter 17 R1, as recalled"
     )
-    """Hurst exponent H of the profile [1]: its spectrum falls as k^-(1 + 2 H)."""
+    """Hurst exponent H of the roughness [1]: its spectrum falls as k^-(1 + 2 H)."""
 
     @model_validator(mode="before")
     @classmethod
     def _read_earlier_form(cls, given: Any) -> Any:
-        """Return the surface of an earlier recording, a band about one wavelength, with that as its roll-off."""
+        """Return the surface of an earlier recording, whose roughness was a narrow band, with that as its roll-off."""
         if isinstance(given, Mapping) and "wavelength" in given:
             left = {name: value for name, value in given.items() if name != "spread"}
             return {"roll_off": left.pop("wavelength"), **left}
@@ -173,31 +173,31 @@ class Surface(Frozen):
         if not static >= kinetic >= 0:
             raise ValueError(f"friction must be static >= kinetic >= 0, not {static:g} and {kinetic:g}")
         if self.stribeck_speed.to("mm/s") < 0 or self.roughness.to("mm") < 0:
-            raise ValueError("a Stribeck speed and a roughness are at least 0")
+            raise ValueError("a Stribeck speed and a roughness must be 0 or more")
         if not (self.roll_off.to("mm") > 0 and 0 < self.hurst.to("1") <= 1):
-            raise ValueError("a roll-off is above 0, a Hurst exponent above 0 and at most 1")
+            raise ValueError("a roll-off must be above 0, a Hurst exponent above 0 and at most 1")
         return self
 
 
 class Slide(Frozen):
-    """Tangential motion of the indenter at a constant speed, at rest before and after."""
+    """Tangential motion of the indenter at constant speed, which is at rest before and after."""
 
     speed: Quantity
-    """Speed of the indenter against the sensor's core [speed], above zero."""
+    """Speed of the indenter relative to the sensor's core [speed], above zero."""
     direction: Quantity = assumed(0.0, "deg", "along the finger, towards the tip")
     """Direction of the motion [angle]: 0 is along x, 90 deg along s."""
     start: Quantity = assumed(30.0, "s", "the middle of a recording of the paper's length")
-    """Beginning of the motion, from the first sample of the recording [time]."""
+    """Start of the motion, counted from the first sample of the recording [time]."""
     duration: Quantity | None = None
-    """Duration of the motion [time]; None: it lasts to the end of the recording."""
+    """Duration of the motion [time]; None: to the end of the recording."""
     surface: Surface = Surface()
 
     @model_validator(mode="after")
     def _is_motion(self) -> Slide:
         if not self.speed.to("mm/s") > 0 or self.start.to("s") < 0:
-            raise ValueError("a slide has a speed above 0 and starts at 0 s or later")
+            raise ValueError("a slide must have a speed above 0 and start at 0 s or later")
         if self.duration is not None and not self.duration.to("s") > 0:
-            raise ValueError("a slide lasts longer than 0 s")
+            raise ValueError("a slide must last longer than 0 s")
         self.direction.to("rad")
         return self
 
@@ -206,26 +206,26 @@ class Slide(Frozen):
 
 
 def _pairs(given: Any) -> Any:
-    """Return a mapping as its sorted pairs, and anything else as it is."""
+    """Return a mapping as its sorted pairs, and any other value unchanged."""
     return tuple(sorted(given.items())) if isinstance(given, Mapping) else given
 
 
 class Simulation(Frozen):
-    """Settings of a simulated rig for a scene; a real rig ignores them."""
+    """Settings with which a simulated rig carries out a scene; a real rig ignores them."""
 
     effects: tuple[Annotated[str, Field(pattern=r"^[+-]?[a-z][a-z0-9-]*$")], ...] = ()
-    """Choice of effects, of which later ones win: ``+name`` always includes an effect or a group, ``-name`` leaves it
-    out, with ``name`` the plan decides. ``+all`` and ``-all`` are all candidates. An effect of another package is a
-    candidate only where it is named here or by the sensor."""
+    """Choice of effects, in which later entries override earlier ones: ``+name`` always includes an effect or a group,
+    ``-name`` excludes it, and ``name`` leaves the choice to the plan. ``+all`` and ``-all`` are all candidates. An
+    effect of another package is a candidate only if it is named here or by the sensor."""
     rung: str | None = None
-    """Name of a rung of the ladder of solvers; None: the default one."""
+    """Name of a solver setting, from a ladder of accuracy and cost; None: the default."""
     tolerance: float | None = Field(default=None, gt=0)
-    """Largest error of an observed channel, in its unit, which chooses the cheapest rung; None: that of the rung."""
+    """Largest error of an observed channel, in its unit, by which the cheapest solver is chosen; None: no choice."""
     scenario: str | None = None
-    """Name of a scenario of the sensor, whose nuisances replace the usual ones; None: the usual ones hold."""
+    """Name of one of the sensor's scenarios, whose nuisances replace the usual ones; None: the usual ones."""
 
     nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
-    """Values of nuisances in place of the scene's or the sensor's, by name: ``placement_scatter_mm: 0.3``."""
+    """Values of nuisances by name, instead of the values of the scene or the sensor: ``placement_scatter_mm: 0.3``."""
 
     @field_serializer("nuisances")
     def _as_mapping(self, nuisances: tuple[tuple[str, float], ...]) -> dict[str, float]:
@@ -234,42 +234,42 @@ class Simulation(Frozen):
     @model_validator(mode="after")
     def _one_of_two(self) -> Simulation:
         if self.rung is not None and self.tolerance is not None:
-            raise ValueError("give a rung or a tolerance, not both: a tolerance picks the rung")
+            raise ValueError("give a rung or a tolerance, not both: a tolerance chooses the rung")
         return self
 
 
 class Scene(Frozen):
-    """The bodies, motions and settings of one recording."""
+    """Description of one recording: the bodies, their motions and the settings."""
 
     name: str
-    """Name, short and unique within a task, and fit for a file name."""
+    """Name of the scene: short, unique within a task, and valid as a file name."""
     indenter: Indenter = Indenter()
     placement: Placement = Placement()
     profile: ForceProfile = ForceRamp()
     drive: ForceLoop | None = None
-    """Force loop that drives the indenter; None: the force follows the profile exactly."""
+    """Force loop that drives the indenter; None: the force follows the profile without error."""
     slide: Slide | None = None
-    """Tangential motion; None: the indenter is pressed only."""
+    """Tangential motion of the indenter; None: it presses without sliding."""
     environment: Environment = Environment()
     session: str = "1"
-    """Name of the session, whose recordings are made without mounting anything anew."""
+    """Name of the session; within a session, nothing is mounted anew between recordings."""
     unit: str = Field(default="1", min_length=1)
-    """Unit of the sensor, as two devices of one type are two units; the spec describes unit 1."""
+    """Number of the sensor unit: two devices of one type are two units. The spec describes unit 1."""
     starts_after_s: float = Field(default=0.0, ge=0)
-    """Time from the session's first sample to the first of this recording [s]."""
+    """Time from the first sample of the session to the first sample of this recording [s]."""
     observe: tuple[ChannelKind, ...] = ("taxel",)
-    """Kinds of channels that are recorded beside the reference force."""
+    """Kinds of channels to record beside the reference force."""
     simulation: Simulation = Simulation()
     labels: dict[str, str | float | int] = Field(default_factory=dict)
-    """Labels of the recording, which tasks may use: {"cap_radius_mm": 5.0}."""
+    """Labels of the recording for use by tasks: {"cap_radius_mm": 5.0}."""
 
     @property
     def first_unit(self) -> bool:
-        """Whether the unit is the one whose rest levels and gain the sensor's spec describes."""
+        """True if the unit is unit 1, whose rest levels and gain the sensor's spec describes."""
         return self.unit == "1"
 
     def nuisances(self) -> dict[str, float]:
-        """Return the values of the scene's nuisances, by name and in the unit of the name."""
+        """Return the scene's nuisances as numbers by name, each in the unit in its name."""
         found = {}
         for name, (way, unit) in NUISANCES.items():
             value: Any = self
@@ -280,9 +280,9 @@ class Scene(Frozen):
         return found
 
     def with_nuisances(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with other `values` of its nuisances, by name; other names are ignored.
+        """Return the scene with `values` for its nuisances, given by name; unknown names are ignored.
 
-        Raises UsageError if a nuisance cannot have its value, or the scene has no such part.
+        Raises UsageError if a nuisance cannot have its value, or if the scene lacks its part, for example a drive.
         """
         given = {name: value for name, value in values.items() if name in NUISANCES}
         data = self.model_dump()
@@ -293,7 +293,7 @@ class Scene(Frozen):
             inside = data
             for part in parts:
                 if inside[part] is None:
-                    raise UsageError(f"{name}: the scene has no {part}.", hint="Leave it out.")
+                    raise UsageError(f"{name}: the scene has no {part}.", hint=f"Leave {name} out.")
                 inside = inside[part]
             is_quantity = isinstance(inside[field], Mapping) or field in _UNITS
             inside[field] = assumed(value, unit, "set for this run") if is_quantity else value
@@ -304,9 +304,9 @@ class Scene(Frozen):
             raise UsageError(f"{listed}: {complaint(error)}.", hint="Give another value.") from error
 
     def simulated_as(self, simulation: Simulation) -> Scene:
-        """Return the scene with other settings of a simulated rig; raises the errors of `with_nuisances`.
+        """Return the scene with the settings `simulation` of a simulated rig; raises the errors of `with_nuisances`.
 
-        The scene's own entries of effects stand before those of `simulation`.
+        Entries for effects in the scene come before those in `simulation`, which override them.
         """
         if simulation == Simulation():
             return self
@@ -319,7 +319,7 @@ _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (
     (("slide", "surface"), Surface),
 )  # fmt: skip
 _UNITS = {"force_filter": "Hz", "indenter_temperature": "degC", "rate": "Hz"}
-"""Units of the fields whose default has none."""
+"""Units of those fields whose default value is None."""
 
 
 def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
@@ -336,9 +336,9 @@ def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
 
 
 NUISANCES: Mapping[str, tuple[tuple[str, ...], str]] = dict(_nuisances())
-"""Numbers of a scene that sources do not state well enough, by name, with their place in the scene and their unit.
+"""Numbers of a scene that no source states well enough, by name, each with its place in the scene and its unit.
 
-The name is part of the scene (except the environment), field and unit: ``since_power_on_s``,
+The name is made of part of the scene (except the environment), field and unit: ``since_power_on_s``,
 ``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
 """
 
@@ -346,7 +346,7 @@ RANGES = ranges(
     ("placement_scatter_mm", 0.0, 0.5, "mm", "assumed", "a machined seat … one fitted by hand"),
     ("placement_tilt_scatter_deg", 0.0, 1.0, "deg", "assumed", "none … 0.2 mm across a cap of 12 mm"),
 )
-"""Ranges of the nuisances of the mount, by name; the ranges of a sensor's own are in its spec."""
+"""Ranges of the nuisances of the mount, by name; ranges of a sensor's own nuisances are in its spec."""
 
 _MAY_BE_NEGATIVE = frozenset({
     "ambient_degc", "indenter_temperature_degc", "placement_x_mm", "placement_s_mm", "placement_tilt_x_rad",

@@ -1,4 +1,4 @@
-"""Media of a sensor's skin, which a sensor declares and the twin solves; ``docs/twin.md`` has the equations."""
+"""Materials of a sensor's skin, as input of the simulation ``twin``; ``docs/twin.md`` has the equations."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
 
 
 class Dome(Frozen):
-    """The tip of a finger, where its cylinder ends in a hemisphere of the same radius.
+    """The tip of a finger, where its cylinder ends in a hemisphere of equal radius.
 
     A point of the dome keeps its axial coordinate on the sheet, which preserves areas (Lambert's cylindrical
     projection), and so loads and volumes.
     """
 
     start: Length
-    """Axial coordinate at which the dome begins; towards positive x [length]."""
+    """Axial coordinate at which the dome begins; the dome extends towards positive x [length]."""
 
 
 class SheetTable(Frozen):
-    """A length over the sheet, symmetric about the midline: a film's thickness, or a surface's relief.
+    """A table of lengths over the sheet, symmetric about its midline: a film's thickness, or a surface's depth.
 
-    It is linear between the entries and constant beyond the outermost.
+    Lengths are linear between entries and constant beyond the outermost entries.
     """
 
     x_mm: tuple[float, ...]
-    """Axial coordinates of the sheet, ascending."""
+    """Axial coordinates of the rows, ascending [mm]."""
     angle_deg: tuple[float, ...]
-    """Angles around the finger from its midline, ascending."""
+    """Angles of the columns around the finger from its midline, ascending [deg]."""
     value_mm: tuple[tuple[float, ...], ...]
-    """Lengths, a row for each of `x_mm` and a column for each of `angle_deg`."""
+    """Lengths, with one row for each of `x_mm` and one column for each of `angle_deg`."""
     source: Source
 
     @model_validator(mode="after")
@@ -49,16 +49,16 @@ class SheetTable(Frozen):
 
     @property
     def least_mm(self) -> float:
-        """The smallest entry."""
+        """Smallest length in the table."""
         return min(map(min, self.value_mm))
 
     @property
     def most_mm(self) -> float:
-        """The largest entry."""
+        """Largest length in the table."""
         return max(map(max, self.value_mm))
 
     def at(self, x_mm: npt.NDArray[np.float64], angle_rad: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return the lengths, (nx, ns) [mm], at (nx,) axial coordinates and (ns,) angles from the midline."""
+        """Return the lengths, (nx, ns) [mm], at (nx,) axial coordinates [mm] and (ns,) angles from the midline."""
         import numpy as np
 
         rows, angle = np.array(self.value_mm), np.abs(np.degrees(angle_rad))
@@ -75,21 +75,21 @@ class SkinSheet(Frozen):
     """The unrolled skin, a rectangle of axial coordinate x and arc length s, with s = 0 on the midline."""
 
     x_min: Length
-    """Axial lower end [length]."""
+    """Lower end of the sheet's axial coordinate [length]."""
     x_max: Length
-    """Axial upper end [length]; towards the tip of a finger."""
+    """Upper end of the sheet's axial coordinate [length]; on a finger, the end at the tip."""
     arc: Length
     """Width of the sheet along the surface [length], centred on s = 0."""
     outer_radius: Length | None = None
-    """Radius of the finger's outer surface [length]; None for a flat pad."""
+    """Radius of the finger's outer surface [length]; None: the skin is a flat pad."""
     dome: Dome | None = None
-    """Dome at the tip of the finger; None: it has none, and is a cylinder or a flat pad."""
+    """Dome at the tip of the finger; None: the skin is a cylinder or a flat pad."""
     relief: SheetTable | None = None
-    """Depth of the finger's unloaded surface inside that cylinder and dome; None: it lies on them."""
+    """Depth of the finger's unloaded surface below the cylinder and dome; None: the surface lies on them."""
     cells: tuple[int, int] = (48, 64)
-    """Default grid, axial x arc."""
+    """Default numbers of grid cells, (axial, arc)."""
     pad: tuple[Length, Length, Length] | None = None
-    """Active part (x_min, x_max, arc) inside soft margins; None: the whole sheet is active."""
+    """Active part (x_min, x_max, arc) within soft, insensitive margins; None: the whole sheet is active."""
 
 
 class FluidBackedShell(Frozen):
@@ -98,27 +98,27 @@ class FluidBackedShell(Frozen):
     medium: Literal["fluid-backed shell"] = "fluid-backed shell"
     sheet: SkinSheet
     young: Pressure
-    """Young's modulus of the sleeve [pressure]."""
+    """Young's modulus of the elastic sleeve [pressure]."""
     poisson: Share
-    """Its Poisson's ratio, 0 to 0.5 [1]."""
+    """Poisson's ratio of the sleeve, 0 to 0.5 [1]."""
     thickness: Length
-    """Thickness of the sleeve [length]."""
+    """Thickness of the sleeve in its unloaded state [length]."""
     mid_radius: Length
     """Radius of the shell's middle surface [length]."""
     tension: Tension
-    """Membrane tension [force / length]."""
+    """Membrane tension of the sleeve [force / length]."""
     contact_stiffness: Stiffness
     """Through-thickness stiffness of the skin under an indenter [pressure / length]."""
     core_stiffness: Stiffness
-    """Penalty of the core once the film is closed [pressure / length]."""
+    """Penalty stiffness of the core after the film is used up [pressure / length]."""
     film: SheetTable
-    """The fluid film at rest."""
+    """Thickness of the unloaded fluid film."""
     residual_film: Length
-    """Film that asperities keep open at touch-down [length]."""
+    """Film thickness that surface roughness keeps open when the sleeve touches the core [length]."""
     clamp_stiffness: Stiffness
-    """Clamp at the sleeve's sealed ends and seam [pressure / length]; a dome's tip is no sealed end."""
+    """Stiffness of the clamp at the sleeve's sealed ends and seam [pressure / length]; a dome's tip is not sealed."""
     clamp_length: Length
-    """Decay length of that clamp [length]."""
+    """Distance over which the clamp's stiffness decays [length]."""
 
 
 class FoamPad(Frozen):
@@ -133,30 +133,30 @@ class FoamPad(Frozen):
     thickness: Length
     """Thickness of the foam at rest, between cover and base [length]."""
     densification: Share
-    """Strain at which the foam is solid [1]."""
+    """Compressive strain at which the foam becomes solid [1]."""
     cover_tension: Tension
-    """Membrane tension of the cover [force / length]."""
+    """Membrane tension of the foam's cover [force / length]."""
     cover_bending: BendingStiffness
-    """Bending stiffness of the cover [force x length]."""
+    """Bending stiffness of the foam's cover [force x length]."""
     contact_stiffness: Stiffness
-    """Penalty on an indenter in the cover [pressure / length], not a property of the material."""
+    """Penalty stiffness against an indenter's penetration [pressure / length]; not a property of the material."""
 
 
 class BondedLayer(Frozen):
-    """A linear elastic layer bonded to a rigid base, frictionless on top."""
+    """A linear elastic layer that is bonded to a rigid base and frictionless on its outer surface."""
 
     medium: Literal["bonded layer"] = "bonded layer"
     sheet: SkinSheet
     young: Pressure
-    """Young's modulus of the layer [pressure]."""
+    """Young's modulus of the elastic layer [pressure]."""
     poisson: Share
-    """Its Poisson's ratio, 0 to below 0.5 [1]."""
+    """Poisson's ratio of the elastic layer, 0 to below 0.5 [1]."""
     thickness: Length
-    """Thickness of the layer at rest, between surface and base [length]."""
+    """Thickness of the unloaded layer, between surface and base [length]."""
     contact_stiffness: Stiffness
-    """Penalty on an indenter in the surface [pressure / length], not a property of the material: that of the sensor
-    `ideal` is 60 times its young / thickness. With a low one, the indenter sinks in and does not deform the layer."""
+    """Penalty stiffness against an indenter's penetration [pressure / length], no property of the material: `ideal` has
+    60 times its young / thickness. If it is low, the indenter penetrates and hardly deforms the layer."""
 
 
 Skin = Annotated[FluidBackedShell | FoamPad | BondedLayer, Field(discriminator="medium")]
-"""Any of the media the twin can press."""
+"""Any skin that the simulation ``twin`` can press."""

@@ -17,26 +17,26 @@ from tactbench.core.spec.sensor import ChannelKind
 METRICS: Final = (
     "rmse", "mae", "mean_euclidean_error", "r2", "accuracy", "balanced_accuracy", "macro_f1", "recall_area",
 )  # fmt: skip
-"""Names of the metrics that a task may have."""
+"""Names of all metrics from which a task may choose."""
 
 WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
-"""Pattern of a place of code, ``module:callable``."""
+"""Regular expression of an import path, ``module:callable``."""
 
 
 class PlannedScene(Frozen):
-    """A scene, and the role of its recording."""
+    """A scene of a task, with the role of its recording as training or test data."""
 
     scene: Scene
     role: Role
     drawn_order: str = ""
-    """Name of a group whose scenes follow each other in an order drawn with the seed; empty: as declared."""
+    """Name of a group of scenes, whose order is drawn with the seed; empty: the scene keeps its declared place."""
 
 
 def in_drawn_order(planned: Sequence[PlannedScene], seed: int) -> tuple[PlannedScene, ...]:
-    """Return the scenes with those of each group of `drawn_order` in an order drawn with `seed`.
+    """Return the scenes, where the scenes of each group of `drawn_order` are in an order drawn with `seed`.
 
-    The members of a group exchange their places in the sequence and their starting times, so that a scene is
-    independent of how warm the sensor is. They are ordered by a hash (BLAKE2) of seed, group and name: uniform over all
+    The scenes of a group exchange their places in the sequence and their starting times, so that a scene is
+    independent of how warm the sensor is. The order is by a hash (BLAKE2) of seed, group and name: uniform over all
     orders, and the same on every machine and in every task that has the group.
     """
 
@@ -61,36 +61,36 @@ class ChannelTarget(Frozen):
     source: Literal["channel"] = "channel"
     kind: ChannelKind = "force"
     name: str | None = None
-    """Name of the channel, where a recording has several of this kind; None: the only one, or the one called
+    """Name of the channel, if a recording has several of this kind; None: the only channel, or the channel named
     `normal`."""
     unit: str = "N"
     reduce: Literal["mean", "max"] | None = None
-    """Reduction of the samples of a recording to its number, for `answer_per: recording`."""
+    """Reduction of a recording's samples of the target to one number, for `answer_per: recording`."""
 
 
 VECTOR_METRIC: Final = "mean_euclidean_error"
-"""Metric of vectors."""
+"""Name of the metric for targets that are vectors."""
 
 
 class VectorTarget(Frozen):
-    """A target that is several channels of the reference; a row without a value of one of them has no label."""
+    """A target made of several reference channels; a row that lacks the value of a channel has no label."""
 
     source: Literal["vector"] = "vector"
     kind: ChannelKind = "position"
-    """Kind of every component."""
+    """Kind of the channels that are the components."""
     names: tuple[str, ...] = Field(min_length=1)
-    """Names of the channels, one for each component."""
+    """Names of the channels that are the components, in order."""
     unit: str
-    """Unit of every component, and so of the length of a difference."""
+    """Unit of every component, and hence of the length of the error vector."""
 
     @property
     def components(self) -> tuple[ChannelTarget, ...]:
-        """The components, each as a target of its own."""
+        """The components, each as a target of one channel."""
         return tuple(ChannelTarget(kind=self.kind, name=name, unit=self.unit) for name in self.names)
 
 
 class LabelTarget(Frozen):
-    """A target that is a label of the recording, or of each row (an annotation)."""
+    """A target that is a label of the whole recording, or of each of its rows (an annotation)."""
 
     source: Literal["label"] = "label"
     name: str
@@ -98,59 +98,59 @@ class LabelTarget(Frozen):
 
 
 class Published(Frozen):
-    """A published figure for a task, which is shown beside the rows that it is comparable with."""
+    """A published score for a task, shown beside the rows with which it is comparable."""
 
     score: float
     reference: str
     protocol: str
-    """Protocol of the rows beside which it is shown."""
+    """Name of the protocol of the rows with which the figure is comparable."""
     sensor: str | None = None
-    """Name of the sensor; None: any."""
+    """Name of the sensor with whose rows the figure is comparable; None: any sensor."""
     estimator: str | None = None
-    """Name of the estimator; None: another model than ours, which `remark` describes."""
+    """Name of the estimator; None: a model that tactbench does not have, described by `remark`."""
     split: str | None = None
-    """Name of the split; None: any."""
+    """Name of the split of the rows with which the figure is comparable; None: any split."""
     title: str = ""
-    """Title in a few words, for a table of reproductions."""
+    """Title of the figure in a few words, for a table of reproductions."""
     remark: str = ""
-    """Differences to our evaluation that a reader must know."""
+    """Differences from the evaluation in tactbench that a reader needs for the comparison."""
 
 
 class Summary(Frozen):
-    """A number for each channel over a window, from the channel's own samples up to the window's end.
+    """A summary: one number for each channel, computed from the channel's own samples in a window.
 
-    Nothing is resampled: each stream is summarised on its own clock.
+    No stream is resampled: each is summarised on its own clock.
     """
 
     measure: Literal["mean", "deviation", "minimum", "maximum", "range", "change", "mean-step", "band-energy"]
-    """``mean``; ``deviation``: standard deviation; ``range``: maximum less minimum; ``change``: last less first;
-    ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square of what a causal
-    band-pass (Butterworth, two poles at either end) leaves, in the channel's unit squared."""
+    """``mean``; ``deviation``: standard deviation; ``range``: maximum minus minimum; ``change``: last minus first
+    sample; ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square after a causal
+    band-pass (Butterworth, two poles at each end), in the channel's unit squared."""
     start: float = Field(default=0.0, ge=0)
     end: float = Field(default=1.0, gt=0)
     unit: Literal["recording", "s"] = "recording"
     """Unit of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
-    protocol keeps; in a frame, they are shares of its length or seconds from its beginning."""
+    protocol keeps; for frames, they are shares of the frame or seconds from its start."""
     band_hz: tuple[float, float] | None = None
-    """Ends of the band of ``band-energy`` [Hz]; None for other measures."""
+    """Lower and upper end of the band of ``band-energy`` [Hz]; None for other measures."""
     kinds: tuple[ChannelKind, ...] = ()
-    """Kinds of channels; empty: all that the task uses."""
+    """Kinds of channels to summarise; empty: all that the task uses."""
 
     @model_validator(mode="after")
     def _one_window_one_band(self) -> Summary:
         if not self.start < self.end:
-            raise ValueError("a window ends after it starts")
+            raise ValueError("the end of a window must be greater than its start")
         if self.unit == "recording" and self.end > 1:
-            raise ValueError("a window in shares of a recording ends at 1 at the latest; set unit: s for seconds")
+            raise ValueError("a window in shares of a recording must end at 1 or before; for seconds, set unit: s")
         if (self.measure == "band-energy") != (self.band_hz is not None):
-            raise ValueError("band_hz belongs to band-energy, which needs it")
+            raise ValueError("band_hz is required by the measure band-energy, and invalid for other measures")
         if self.band_hz and not 0 < self.band_hz[0] < self.band_hz[1]:
-            raise ValueError("a band's lower end is above 0 Hz and below its upper end")
+            raise ValueError("the lower end of band_hz must be above 0 Hz and below the upper end")
         return self
 
     @property
     def name(self) -> str:
-        """Name in features and rows."""
+        """Name of the summary in features and rows."""
         band = "" if self.band_hz is None else f" {self.band_hz[0]:g}-{self.band_hz[1]:g} Hz"
         whole = self.unit == "recording" and (self.start, self.end) == (0.0, 1.0)
         unit = "s" if self.unit == "s" else "of the recording"
@@ -159,95 +159,95 @@ class Summary(Frozen):
 
 
 class TaskFields(Frozen):
-    """Fields of tasks of plugins and of those that mappings declare."""
+    """Fields that tasks of plugins and tasks declared by mappings have in common."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
     title: str = ""
     question: str = ""
-    """The question in one sentence."""
+    """The question that the task poses, in one sentence."""
     features: tuple[ChannelKind, ...] = ("taxel",)
-    """Kinds of channels that an estimator may use."""
+    """Kinds of channels that an estimator may use as features."""
     optional_features: tuple[ChannelKind, ...] = ()
-    """Further kinds, used where a sensor has them."""
+    """Further kinds of channels, used as features if a sensor has them."""
     summaries: tuple[Summary, ...] = ()
-    """Numbers of each channel that are the features of a recording or of a frame."""
+    """Summaries of each channel that are the features of a recording or of a frame."""
     vote: Literal["frames"] | None = None
-    """Combination of frames to the answer for a recording: the commonest class, the first of equals, or the mean."""
+    """Combination of frames' answers to a recording's answer: the commonest class (the first of equals) or the mean."""
 
 
 class TaskSpec(TaskFields):
-    """A task as data, which the core carries out."""
+    """Specification of a task as data, evaluated without code of its own."""
 
     title: str
     question: str
     kind: Literal["regression", "classification", "events"]
-    """Kind of answer. For `events`, it is when something begins: detectors score frames, `alarms` makes alarms."""
+    """Kind of answer. For `events`, it is a time of onset: detectors score frames, and `alarms` makes alarms."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
-    """Unit of an answer. `recording`: one class or number for each, by `summaries` and `features_by` or by `vote`;
-    its label does not change within a recording. `frame`: one for each window of the target's length."""
+    """Unit of an answer. `recording`: one class or number for each recording, by `summaries` and `features_by` or by
+    `vote`; its label is constant within a recording. `frame`: one answer for each window of the target's length."""
     alarms: AlarmPolicy | None = None
-    """Rules of alarms, for events."""
+    """Rules by which scores of frames become alarms, for events."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
-    """Largest rate of false alarms on validation recordings [1/min], below which the threshold of largest recall is
-    chosen."""
+    """Largest rate of false alarms on validation recordings [1/min], subject to which the threshold with the largest
+    recall is chosen."""
     features_by: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` for features of the task's own beside `summaries`, called with a recording as a tuple of
     :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording."""
     metric: str
-    """Name of the primary metric; see docs/glossary.md."""
+    """Name of the primary metric; docs/glossary.md describes the metrics."""
     unit: str = "1"
-    """Unit of the primary metric."""
+    """Unit of the primary metric, 1 for a pure number."""
     equivalence: float | None = Field(default=None, ge=0)
-    """Largest difference of scores that are the same in practical use, in the metric's unit; None: not stated."""
+    """Largest difference of scores that is irrelevant in practice, in the metric's unit; None: not stated."""
     scenes: tuple[PlannedScene, ...] = ()
-    """Scenes that a rig records; empty: only recordings made elsewhere can answer."""
+    """Scenes to be recorded by a rig; empty: the task needs recordings made elsewhere."""
     campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)
-    """Scenes that a rig records for a split instead of `scenes`, by its name; such a split leaves its groups out one by
-    one. Scenes of one name are the same in every campaign."""
+    """Scenes that a rig records for a split instead of `scenes`, by name of the split; such a split leaves its groups
+    out in turn. Scenes of equal name are the same in every campaign."""
     protocols: tuple[str, ...]
-    """Names of the allowed protocols, the default first."""
+    """Names of the allowed protocols; the first is the default."""
     splits: tuple[str, ...] = ()
-    """Splits for the protocol `deployable`, the default first: roles, session, in-session, few-shot-N, or a group's
-    name."""
+    """Names of the splits for the protocol `deployable`, the first by default: roles, session, in-session, few-shot-N,
+    or a group's name."""
     estimators: tuple[str, ...]
-    """Names of the default estimators."""
+    """Names of the estimators that are evaluated by default."""
     baselines: tuple[str, ...]
-    """Names of the trivial estimators, which stand in every table; others are measured by the best of them."""
+    """Names of the trivial estimators, which are in every table; others are compared with the best of them."""
     published: tuple[Published, ...] = ()
     beside: tuple[str, ...] = ()
-    """Names of tasks that are run whenever this one is, to be read beside it."""
+    """Names of related tasks that are always run together with this task."""
     replicates: int | None = Field(default=None, ge=1)
-    """Default number of replicates on a simulated rig; None: that of any task."""
+    """Default number of replicates on a simulated rig; None: the same number as for other tasks."""
 
     @model_validator(mode="after")
     def _has_a_metric_that_fits(self) -> TaskSpec:
         if self.metric not in METRICS:
             close = nearest(self.metric, METRICS) or METRICS
-            raise ValueError(f"there is no metric {self.metric!r}; did you mean {' or '.join(close)}?")
+            raise ValueError(f"no metric is called {self.metric!r}; did you mean {' or '.join(close)}?")
         if self.kind == "classification" and isinstance(self.target, ChannelTarget):
             raise ValueError(
-                f"a channel of kind {self.target.kind} is a number: give classes or a threshold (a LabelTarget or a "
+                f"a channel of kind {self.target.kind} is a number: give a target with classes (a LabelTarget or a "
                 "SlipTarget), or kind: regression"
             )
         vector = isinstance(self.target, VectorTarget)
         if vector and self.kind != "regression":
-            raise ValueError("a vector is predicted by kind: regression")
+            raise ValueError("a target that is a vector needs kind: regression")
         if vector != (self.metric == VECTOR_METRIC):
-            raise ValueError(f"metric {VECTOR_METRIC} and a target that is a vector belong together")
+            raise ValueError(f"metric {VECTOR_METRIC} and a target that is a vector require each other")
         return self
 
     @model_validator(mode="after")
     def _frames_are_answered_in_one_way(self) -> TaskSpec:
         framed = isinstance(self.target, SlipTarget)
         if framed != (self.answer_per == "frame"):
-            raise ValueError("answer_per: frame and a target of frames belong together")
+            raise ValueError("answer_per: frame and a target of frames require each other")
         if framed and (not self.summaries or self.features_by or self.vote):
             raise ValueError("answer_per: frame needs summaries, and neither features_by nor vote")
         if framed and "in-session" in self.splits:
-            raise ValueError("split in-session cuts recordings in time; frames look back across a cut")
+            raise ValueError("split in-session cuts recordings in time, and a frame would extend across a cut")
         if (self.kind == "events") != (self.alarms is not None and self.max_false_alarms_per_minute is not None):
-            raise ValueError("kind: events needs alarms and max_false_alarms_per_minute, which belong to it")
+            raise ValueError("kind: events needs alarms and max_false_alarms_per_minute; other kinds take neither")
         if self.kind == "events" and not framed:
             raise ValueError("kind: events needs a target of frames")
         return self
@@ -260,26 +260,26 @@ class TaskSpec(TaskFields):
         reduced = isinstance(self.target, ChannelTarget) and self.target.reduce is not None
         if self.answer_per == "sample":
             if summarised or self.vote or reduced:
-                raise ValueError("summaries, features_by, vote and a channel's reduce belong to answer_per: recording")
+                raise ValueError("summaries, features_by, vote and a channel's reduce need answer_per: recording")
             return self
         if summarised == bool(self.vote):
             raise ValueError("answer_per: recording needs either summaries or features_by, or else vote: frames")
         if not isinstance(self.target, LabelTarget) and not reduced:
             raise ValueError("answer_per: recording needs a label, or a channel with `reduce`")
         if "in-session" in self.splits:
-            raise ValueError("split in-session cuts recordings in time; answer_per: recording takes each as a whole")
+            raise ValueError("split in-session cuts recordings in time; answer_per: recording does not allow cuts")
         if unseen := {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at):
-            raise ValueError(f"summaries of {', '.join(sorted(unseen))}, which the task's features do not have")
+            raise ValueError(f"summaries: {', '.join(sorted(unseen))} must be among the task's features")
         return self
 
     @property
     def looks_at(self) -> tuple[ChannelKind, ...]:
-        """Kinds of channels that an estimator may use where a sensor has them."""
+        """Kinds of channels that an estimator may use, if a sensor has them: features and optional features."""
         return (*self.features, *self.optional_features)
 
     @property
     def answer_from(self) -> str:
-        """Description of what an answer is made of, with the rules of events; empty where answers are of samples."""
+        """Description of the data behind one answer, with the rules for events; empty if each sample has an answer."""
         if self.alarms is not None:
             return (
                 f"{self.target}; {self.alarms}; recall area up to {AREA_PER_MINUTE:g} false alarms a "
@@ -293,7 +293,7 @@ class TaskSpec(TaskFields):
         return ", ".join([one.name for one in self.summaries] + own)
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
-        """Return the published figure for a result, one for this sensor first; None: none is comparable."""
+        """Return the published figure comparable with a result, preferably of this sensor; None: there is none."""
         fitting = (
             one for one in self.published if one.protocol == protocol and one.sensor in (None, sensor)
             and one.estimator in (None, estimator) and (split is None or one.split in (None, split))
@@ -301,5 +301,5 @@ class TaskSpec(TaskFields):
         return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)
 
     def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:
-        """Return the scenes that a rig records for `split`, as declared; None is the default split."""
+        """Return the scenes, as declared, that a rig records for `split`; None stands for the default split."""
         return self.scenes if split is None else self.campaigns.get(split, self.scenes)

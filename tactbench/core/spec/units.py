@@ -1,4 +1,4 @@
-"""Units in a small table: every number can be turned into SI, or its unit is refused.
+"""Table of units: every unit is converted to SI, or refused.
 
 Compound units are products and quotients of the names below, for example ``N/mm``, ``MPa/mm``, ``N*mm``.
 """
@@ -10,7 +10,7 @@ from functools import lru_cache
 from tactbench.core.errors import UsageError, did_you_mean
 
 Dimension = tuple[int, ...]
-"""Exponents of (length, mass, time, current, temperature, count)."""
+"""Exponents of the base dimensions (length, mass, time, current, temperature, count)."""
 
 _BASE = ("m", "kg", "s", "A", "K", "count")
 _PREFIXES = {"M": 1e6, "k": 1e3, "h": 1e2, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
@@ -20,19 +20,19 @@ _SYMBOLS = {
     "S": (1.0, "A/V"), "ohm": (1.0, "V/A"), "F": (1.0, "A*s/V"), "T": (1.0, "N/A/m"),
     "gf": (9.80665e-3, "N"),  # by standard gravity, 9.80665 m/s² (CGPM 1901)
 }  # fmt: skip
-"""Units that take a prefix: how many of another unit each is."""
+"""Factors of units that take a prefix, each with the unit in which the factor is given."""
 _WORDS = {
     "1": (1.0, ""), "%": (0.01, ""), "count": (1.0, "count"), "min": (60.0, "s"), "rad": (1.0, ""),
     "deg": (0.017453292519943295, ""), "degC": (1.0, "K"),
 }  # fmt: skip
-"""Units without a prefix. Temperatures in degC are differences, as in K."""
+"""Factors of units that take no prefix. Temperatures in degC are differences, as in K."""
 
 
 @lru_cache(maxsize=256)
 def parse(unit: str) -> tuple[float, Dimension]:
-    """Return the factor to SI and the dimension of `unit`; raises UsageError with near names if it is unknown."""
+    """Return the factor to SI and the dimension of `unit`; raise UsageError, with similar names, if unknown."""
     if not unit.strip():
-        raise UsageError("The unit is empty.", hint="Write 1 for a pure number, count for a raw reading.")
+        raise UsageError("The unit is empty.", hint="Write 1 for a pure number, or count for a raw reading.")
     factor, exponents, sign = 1.0, (0,) * len(_BASE), 1
     for token in unit.replace("*", " * ").replace("/", " / ").split():
         if token in ("*", "/"):
@@ -45,7 +45,7 @@ def parse(unit: str) -> tuple[float, Dimension]:
 
 
 def _named(name: str, unit: str) -> tuple[float, Dimension]:
-    """Return the factor and the dimension of one name in `unit`."""
+    """Return the factor to SI and the dimension of `name`, which is a part of `unit`."""
     if name in _BASE:
         return 1.0, tuple(int(name == one) for one in _BASE)
     table, prefix, symbol = {**_SYMBOLS, **_WORDS}, 1.0, name
@@ -60,17 +60,17 @@ def _named(name: str, unit: str) -> tuple[float, Dimension]:
 
 
 def with_unit(name: str, unit: str) -> str:
-    """Return a name with its unit: ``force_noise_n``, ``drive_integral_mm_per_n_s``; the name of a pure number."""
+    """Return a name with its unit: ``force_noise_n``, ``drive_integral_mm_per_n_s``; pure numbers add no unit."""
     unit_text = unit.lower().replace("*", "_").replace("/", "_per_", 1).replace("/", "_")
     return name if unit == "1" else f"{name}_{unit_text}"
 
 
 def conversion(given: str, target_unit: str) -> float:
-    """Return the factor from `given` to `target_unit`; raises UsageError for an unknown one or another dimension."""
+    """Return the factor from `given` to `target_unit`; raise UsageError for an unknown unit or another dimension."""
     (size, dimension), (target, wanted_dimension) = parse(given), parse(target_unit)
     if dimension != wanted_dimension:
         raise UsageError(
-            f"The unit {given!r} cannot be turned into {target_unit!r}: they measure different things.",
-            hint="Correct the unit.",
+            f"The unit {given!r} cannot be converted to {target_unit!r}, which has another dimension.",
+            hint="Give a unit of the same dimension.",
         )
     return size / target

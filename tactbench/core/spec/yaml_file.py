@@ -14,19 +14,19 @@ from tactbench.core.errors import ConfigError, did_you_mean
 M = TypeVar("M", bound=BaseModel)
 Path_ = tuple[str | int, ...]
 Places = dict[Path_, tuple[int, yaml.Node]]
-"""The line and the node of every key and item, by its path in the file."""
+"""Line and YAML node of every key and item, by its path in the file."""
 
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-"""The loader in C, which is eight times as fast, where PyYAML was built with it."""
+"""PyYAML's loader in C, eight times as fast as the loader in Python, which is used if PyYAML was built without it."""
 _INT, _FLOAT, _TEXT = (f"tag:yaml.org,2002:{name}" for name in ("int", "float", "str"))
 _KEYS = (_INT, _TEXT, "tag:yaml.org,2002:merge")
 _WHOLE = re.compile(r"-?[1-9][0-9]*|0")
 _ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
-"""Numbers of YAML 1.1 that are read as others than they seem: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
+"""Patterns of texts whose value in YAML 1.1 is a surprise: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
 
 
 def load_yaml(path: Path, model: type[M]) -> M:
-    """Return the file at `path` as a `model`.
+    """Read the YAML file at `path` and return its content as a `model`.
 
     Raises ConfigError, which starts with ``file:line``, if the file cannot be read, is not YAML, repeats a key, has an
     unknown key (the nearest known one is offered), or a value that `model` refuses.
@@ -38,7 +38,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
         reason = getattr(error, "strerror", "") or "it is not UTF-8 text"
         raise ConfigError(file, None, f"cannot be read: {reason}.", hint="Check the path and the file.") from error
     if node is None:
-        raise ConfigError(file, None, "is empty.", hint="See docs/ for an example.")
+        raise ConfigError(file, None, "is empty.", hint="Write settings into it; docs/ has examples.")
     places: Places = {}
     _collect_places(node, (), places, file)
     try:
@@ -48,7 +48,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
 
 
 def plain_value(text: str) -> Any:
-    """Return `text` as the number or truth value that YAML reads in it, and any other text as it is."""
+    """Return `text` as the number or truth value that it has in YAML, and any other text unchanged."""
     try:
         node, value = _loaded(text, "")
         _collect_places(node, (), {}, "")
@@ -58,7 +58,7 @@ def plain_value(text: str) -> Any:
 
 
 def _loaded(text: str, file: str) -> tuple[Any, Any]:
-    """Return the node and the plain data of a text; raises ConfigError."""
+    """Return the YAML node and the plain data of a text; raise ConfigError for invalid YAML."""
     try:
         loader = _LOADER(text)
         node = loader.get_single_node()
@@ -68,11 +68,11 @@ def _loaded(text: str, file: str) -> tuple[Any, Any]:
         problem = getattr(error, "problem", None) or "is not YAML"
         raise ConfigError(file, mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax.") from error
     except (ValueError, RecursionError) as error:  # a number or date that is not valid, or brackets without end
-        raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
+        raise ConfigError(file, None, f"has values that cannot be read: {error}.", hint="Quote texts.") from error
 
 
 def _collect_places(node: Any, at: Path_, places: Places, file: str) -> None:
-    """Add every key and item to `places`; raise ConfigError for a value that YAML reads as another than is written."""
+    """Add every key and item to `places`; raise ConfigError for a value whose YAML meaning differs from its look."""
     line = node.start_mark.line + 1
     places.setdefault(at, (line, node))
     if isinstance(node, yaml.MappingNode):
@@ -85,7 +85,7 @@ def _collect_places(node: Any, at: Path_, places: Places, file: str) -> None:
                     file, line, f"the key {key} is neither a word nor a whole number.", hint=f"Quote it: '{key}'."
                 )  # fmt: skip
             if key in seen:
-                raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
+                raise ConfigError(file, line, f"the key {key!r} occurs twice.", hint="Remove one of them.")
             seen.add(key)
             place: Path_ = (*at, int(key) if number else key)
             places[place] = line, value_node
@@ -96,13 +96,13 @@ def _collect_places(node: Any, at: Path_, places: Places, file: str) -> None:
     elif node.tag in (_INT, _FLOAT) and _ODD_NUMBER.match(node.value):
         written = node.value[:80]
         raise ConfigError(
-            file, line, f"{written} would be read as another number than is written.",
+            file, line, f"YAML reads {written} as a different number.",
             hint=f"Quote it if it is a word: '{written}'; else leave out leading zeros, _ and :.",
         )  # fmt: skip
 
 
 def _explain(error: ValidationError, file: str, places: Places, model: type[BaseModel]) -> ConfigError:
-    """Return the first complaint of pydantic as an error with its line in the file."""
+    """Return pydantic's first complaint as an error that names the line in the file."""
     complaints = error.errors(include_url=False)
     # A misspelt key is both unknown and missing: the unknown one is what the writer sees on the page.
     first = next((one for one in complaints if one["type"] == "extra_forbidden"), complaints[0])
@@ -116,9 +116,9 @@ def _explain(error: ValidationError, file: str, places: Places, model: type[Base
         schema = model.model_json_schema()
         parts = (schema, *schema.get("$defs", {}).values())
         meant = did_you_mean(str(loc[-1]), {key for part in parts for key in part.get("properties", {})}).strip()
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove it.")
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove the key.")
     if first["type"] == "missing":
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add the key.")
     text = ""
     if isinstance(node, yaml.ScalarNode):  # as it is written: yes, not True, and texts in quotes
         text = repr(node.value) if node.tag == _TEXT else str(node.value)

@@ -121,7 +121,7 @@ def test_a_plugin_may_bring_every_kind_of_thing(site):
 BAD = {
     "raises": ("raise RuntimeError('no vendor')", "RuntimeError: no vendor"),
     "no-version": ("", "TACTBENCH_API"),
-    "no-hook": (HEAD, "implements none"),
+    "no-hook": (HEAD, "implements no hook of"),
     "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "tactbench_device"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),
     "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), r"ZeroDivisionError.*\(hook_raises.py, line \d"),

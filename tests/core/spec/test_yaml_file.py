@@ -45,7 +45,7 @@ def test_a_key_that_yaml_would_change_is_refused_as_it_is_written(tmp_path, key)
 
 @pytest.mark.parametrize("value", ["010", "12:30"])
 def test_a_number_in_an_odd_notation_is_refused(tmp_path, value):
-    with pytest.raises(ConfigError, match=f"matrix.yaml:2: {value} "):
+    with pytest.raises(ConfigError, match=f"matrix.yaml:2: YAML reads {value} "):
         load(tmp_path, f"tasks: [force]\nrepeats: {value}\n")
     assert plain_value(value) == value
 
