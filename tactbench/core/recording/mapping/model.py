@@ -21,8 +21,8 @@ Column = int | str
 
 WORD = r"^[a-z][a-z0-9_]*$"
 MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
-"""Kinds of channels that are learnt, and the unit to which theirs must convert. A mapping lists the numbers that mean
-"no sample" in them, which would be learnt too."""
+"""Kinds of channels that estimators learn, and the unit to which a channel's unit must convert. A mapping must list the
+numbers that mean "no sample" in such channels, as these would be learnt too."""
 
 
 class Tabular(Frozen):
@@ -31,14 +31,14 @@ class Tabular(Frozen):
     header: bool
     """True: the first line names the columns. False: the file has no such line, and columns are numbered from 0."""
     skiprows: int | tuple[int, ...] = 0
-    """Lines that are left out: how many at the beginning, or the list of their places, counted from 0."""
+    """Lines to leave out: their number at the beginning of the file, or a list of their places, counted from 0."""
     no_sample: tuple[str, ...] = ()
     """Texts that stand for "no sample" where a cell holds nothing else, for example "" or "NA"."""
     decimal: str = Field(default=".", min_length=1, max_length=1)
     thousands: str | None = Field(default=None, min_length=1, max_length=1)
-    """The mark between groups of three digits; None: there is none."""
+    """The mark between groups of three digits; None: digits are not grouped."""
     comment: str | None = Field(default=None, min_length=1, max_length=1)
-    """The mark that begins a comment, which ends with its line; None: there are no comments."""
+    """The mark that begins a comment, which ends with its line; None: the file has no comments."""
 
     @model_validator(mode="after")
     def _marks_differ(self) -> Tabular:
@@ -95,16 +95,16 @@ class Arrays(Frozen):
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
         if (self.format == "npy") == bool(self.array):
-            raise ValueError("array names one of several in an npz or mat file, and nothing in an npy file")
+            raise ValueError("array must name an array of an npz or mat file, and is not allowed for an npy file")
         if max(self.axes.count("recording"), self.axes.count("row")) > 1:
-            raise ValueError("axes name recording or row twice; only channel may stand several times")
+            raise ValueError("axes name recording or row twice; only channel may occur several times")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
 
 
 class Bag(Frozen):
-    """A topic of an MCAP bag: a message is a row, columns are paths of fields, ``wrench.force.z`` or ``data.0..63``."""
+    """A topic of an MCAP bag; rows are messages, columns are paths of fields, ``wrench.force.z`` or ``data.0..63``."""
 
     format: Literal["mcap"] = "mcap"
     topic: str
@@ -126,7 +126,7 @@ class Time(Frozen):
     zone: str | None = None
     """Time zone of dates that have none of their own, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
-    """Number at which the counter begins at 0 again, for example 4294967296; None: it never does."""
+    """Number at which the counter restarts at 0, for example 4294967296; None: it never restarts."""
     offset_s: float = 0.0
     """Seconds that are added to all times, where one clock is known to lag behind another."""
 
@@ -151,7 +151,7 @@ class TableSource(Frozen):
     """The files of one table: all have the same columns, and each belongs to one recording or to several."""
 
     files: str
-    """Pattern of their paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
+    """Pattern of the files' paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
     path: re.Pattern[str] = re.compile("")
     """Regular expression that is searched for in each path; its named groups become words."""
     read: Annotated[Csv | Text | Records | Xlsx | Arrays | Bag | Parquet, Field(discriminator="format")]
@@ -169,13 +169,13 @@ class Join(Frozen):
     """The rule by which rows of several tables belong together."""
 
     by: Literal["rows", "clock"]
-    """`rows`: the rows of one number belong together. `clock`: every table keeps its own rows and its own times."""
+    """`rows`: rows with the same number belong together. `clock`: every table keeps its own rows and its own times."""
     times_within_ms: float | None = Field(default=None, gt=0)
-    """Largest difference of the times of one row [ms], needed where tables with clocks are joined by rows."""
+    """Largest difference between the times of joined rows [ms]; required if tables with clocks are joined by rows."""
 
 
 class Word(Frozen):
-    """A word that is made of another one."""
+    """A word (a named value) that is derived from another word."""
 
     of: str = Field(pattern=WORD)
     values: dict[Scalar, str] | None = None
@@ -204,7 +204,7 @@ class ChannelGroup(Frozen):
     unit: str
     """Unit in which the numbers are stored."""
     given_in: str | None = None
-    """Unit of the numbers in the column; None: the same."""
+    """Unit of the numbers in the column; None: the same as `unit`."""
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample". A force or torque must list them, or state ``[]``."""
     lower: float | None = None
@@ -224,7 +224,7 @@ class ChannelGroup(Frozen):
             _convertible(self.unit, measured)
         except ValueError as error:
             raise ValueError(
-                f"a {self.kind} is in {measured} or a unit that converts to it ({error}); a scale's kg is "
+                f"kind {self.kind} needs {measured} or a unit that converts to it ({error}); a scale's kg is "
                 "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
             ) from error
         if self.sentinels is None:
@@ -257,7 +257,7 @@ class StreamSource(Frozen):
     table: str
     of: Literal["sensor", "reference"] = "sensor"
     rate_hz: float | None = Field(default=None, gt=0)
-    """Nominal rate as the source states it [Hz]; None: it states none."""
+    """Nominal rate as the source states it [Hz]; None: no rate is stated."""
     rate_source: Source | None = None
     dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
     channels: tuple[ChannelGroup, ...] = Field(min_length=1)
@@ -279,7 +279,7 @@ class SensorDeclaration(Frozen):
     principle: str
     principle_source: Source
     link_delay: Quantity | None = None
-    """Time from taking a sample to having it in the host [time]; None: not known."""
+    """Time from taking a sample to its receipt by the host [time]; None: not known."""
     references: tuple[str, ...] = ()
 
 
@@ -311,7 +311,7 @@ class DataSource(Frozen):
     measured: str
     """The measured quantity or event, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
-    """Tasks that the recordings can answer; all are run where a command names none."""
+    """Tasks that the recordings can answer; a command that names no task runs all of these."""
     bytes: int = Field(ge=1)
     """Size of all files together [bytes]."""
     files: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]] = Field(min_length=1)
@@ -329,7 +329,7 @@ class Mapping(Frozen):
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
-    """Tables by name. Each file of the first is joined by the files of the others that have the same words."""
+    """Tables by name. Each file of the first table is joined with the files of the others that have the same words."""
     join: Join | None = None
     split_by: dict[Annotated[str, Field(pattern=WORD)], Column] = Field(default_factory=dict)
     """Columns of the first table by word: each combination of their values becomes a recording, with the values as
@@ -347,12 +347,12 @@ class Mapping(Frozen):
     def _hangs_together(self) -> Mapping:
         for name, stream in self.streams.items():
             if stream.table not in self.tables:
-                raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
+                raise ValueError(f"stream {name} names the table {stream.table!r}; tables are {', '.join(self.tables)}")
             if (self.tables[stream.table].time is None) != (self.clock == "none"):
-                raise ValueError(f"clock is {self.clock}, so that table {stream.table} must have a time (or none)")
+                raise ValueError(f"clock is {self.clock}: table {stream.table} needs a `time`, or none without clock")
         join, several = self.join, len(self.tables) > 1
         if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
-            raise ValueError("several tables need `join`, by rows or by clock, and can be no arrays")
+            raise ValueError("several tables need `join`, by rows or by clock, and cannot be arrays")
         if join is not None and join.by == "rows" and join.times_within_ms is None and several and self.clock != "none":
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if join is not None and join.by == "clock" and (self.clock == "none" or self.split_by):
