@@ -32,7 +32,7 @@ WINDOWS = 6
 LOWEST = 10
 """Number of smallest residuals in each window from which the error bound is computed."""
 _SLACK_NS = 1e-3
-"""Tolerance [ns] above which a point counts as below a line; float64 rounds residuals to 1e-5 ns [derived]."""
+"""Distance [ns] below a line up to which a point counts as on it; float64 rounds residuals to 1e-5 ns [derived]."""
 
 MOST_DRIFT, JITTER_NS = 1e-2, 100_000_000
 """Largest relative rate error of a device's clock, a hundred times a quartz clock's, and largest delay of the host's

@@ -123,7 +123,7 @@ class Completeness:
                 yield f"{name}: {lost} of {due} rows lost"
 
     def _frozen(self, name: str, from_ns: int, to_ns: int) -> bool:
-        """Return True if a sensor is constant while the force changes, or a force sensor that mostly changes is."""
+        """Return True if a sensor is constant while the force changes, or a usually changing force sensor is."""
         if name not in self._reference:
             every = [value for _, value in self._force]
             within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]

@@ -135,7 +135,7 @@ class DataSet:
             except OSError as error:
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
-                    f"{self.name}: {origin} could not be fetched{missed}: {error}. The files belong into {self.files}.",
+                    f"{self.name}: {origin} could not be fetched{missed}: {error}. The files belong in {self.files}.",
                     hint="Put the files there by hand, or name a folder with a copy as `root` (--root DIR). "
                     "Files fetched before are kept.",
                 ) from error

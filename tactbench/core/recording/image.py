@@ -91,7 +91,7 @@ def require_free(path: Path) -> None:
 
 
 def build(meta: RecordingMeta, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
-    """Return the bytes of an HDF5 file with all blocks, and their content digest, computed before HDF5 stores them."""
+    """Return the bytes of an HDF5 file with all blocks and with their digest, computed before HDF5 stores them."""
     return hdf5_image(lambda file: _fill(file, meta, blocks, annotations, complete))
 
 

@@ -65,7 +65,7 @@ def find_lag(
 
     Notes
     -----
-    Separable least squares (Golub and Pereyra 1973) in the lag, by Gauss-Newton steps from that of best correlation.
+    Separable least squares (Golub and Pereyra 1973) in the lag, by Gauss-Newton steps from the lag of best correlation.
     The error combines the jackknife over eight stretches of time and the difference between the two fits.
     """
     if min(len(sensor), len(force)) < FEWEST_ROWS or not sensor.shape[1] or not force.shape[1]:

@@ -209,7 +209,7 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
     if BROKEN_LINKS in notes:
         raise MappingError(
             f"{notes[BROKEN_LINKS]}.",
-            hint="Fetch files stored elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
+            hint="Fetch files of git-annex: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
     if not kinds[""]:
         raise MappingError(

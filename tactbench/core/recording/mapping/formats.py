@@ -129,7 +129,7 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
     values = arrays[how.array]
     if values.ndim != len(how.axes) or values.dtype.kind not in "iufb" or not values.size:
         raise MappingError(
-            f"{shown}: array {how.array!r} of {values.dtype} has the shape {values.shape}, where {', '.join(how.axes)} "
+            f"{shown}: array {how.array!r} of {values.dtype} has the shape {values.shape}; axes {', '.join(how.axes)} "
             "of numbers are expected.",
             hint="Name each axis: recording, row or channel; or name another array.",
         )

@@ -224,7 +224,7 @@ class ChannelGroup(Frozen):
             _convertible(self.unit, measured)
         except ValueError as error:
             raise ValueError(
-                f"kind {self.kind} needs {measured} or a unit that converts to it ({error}); a scale's kg is "
+                f"a {self.kind} needs the unit {measured} or a convertible unit ({error}); a scale's kg is "
                 "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
             ) from error
         if self.sentinels is None:
@@ -349,7 +349,7 @@ class Mapping(Frozen):
             if stream.table not in self.tables:
                 raise ValueError(f"stream {name} names the table {stream.table!r}; tables are {', '.join(self.tables)}")
             if (self.tables[stream.table].time is None) != (self.clock == "none"):
-                raise ValueError(f"clock is {self.clock}: table {stream.table} needs a `time`, or none without clock")
+                raise ValueError(f"table {stream.table}: `time` is required, but not allowed with `clock: none`")
         join, several = self.join, len(self.tables) > 1
         if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
             raise ValueError("several tables need `join`, by rows or by clock, and cannot be arrays")

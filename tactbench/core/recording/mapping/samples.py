@@ -107,7 +107,7 @@ def _labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]
         stretches = np.arange(len(table), dtype=np.int64) // (annotation.rows_per or 1)
         if len(table) % (annotation.rows_per or 1):
             raise MappingError(
-                f"{table.shown} has {len(table)} rows, no multiple of {annotation.rows_per} ({name}).",
+                f"{table.shown} has {len(table)} rows, no multiple of `rows_per` {annotation.rows_per} ({name}).",
                 hint="Add or remove rows, or correct `rows_per`.",
             )
         return stretches
@@ -227,7 +227,7 @@ def _jumps(column: FloatArray, period: int) -> int:
 
 
 def _is_apart(column: FloatArray, value: float, off: float) -> bool:
-    """Return True if a value lies apart from samples around it; `off`: its distance from all others, in their range.
+    """Return True if a value is far from samples around it; `off`: distance from all others in units of their range.
 
     If it is near their range, the samples before and after it must be alike, unlike at a change of the contact.
     """

@@ -184,8 +184,8 @@ class TextTable(Table):
             return f"This line is a comment: write `comment: {mark!r}` under `read`."
         if row == 0 and not any(math.isfinite(self._number(one[0])) for one in columns):
             return (
-                f"No cell of this row is a number, like units: write `skiprows: [{self.places[0] - 1}]` under "
-                "`read` (lines count from 0), beside the lines left out already."
+                f"No cell of this row is a number (units?): write `skiprows: [{self.places[0] - 1}]` under "
+                "`read` (lines count from 0), with the lines left out already."
             )
         marks = [mark for mark in _MARKS if mark in cell and mark != self.how.decimal]
         if marks and not cell.strip("+-0123456789eE" + _MARKS):
