@@ -22,7 +22,7 @@ class BridgeEmulator:
     """Emulated bridge between a serial port and one SPI bus."""
 
     exchange: Exchange
-    """The device on the bus."""
+    """Function of the device on the bus, which computes the bytes received from those sent."""
     holds: int = 4
     """Largest number of batches in the bridge, the running one included."""
     largest_payload: int = 4096

@@ -1,4 +1,4 @@
-"""Byte streams: serial ports, pseudo-terminals, TCP sockets and other URLs of pyserial."""
+"""Links for byte streams: serial ports, pseudo-terminals, TCP sockets and other URLs of pyserial."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 
 
 class ByteLink(Link):
-    """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
+    """Link for a byte stream in both directions: a :class:`SerialLink`, or the link of an emulated device."""
 
     silence_hint = f"{Link.silence_hint} Many boards start anew when their port is opened (DTR), and need some seconds."
 

@@ -55,7 +55,7 @@ class CanFrame:
 
 
 class CanLink(Link):
-    """Frames to and from a CAN bus: a :class:`CanBus`, or an emulated device's.
+    """Link for frames to and from a CAN bus: a :class:`CanBus`, or the link of an emulated device.
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ BUFFER_BYTES = 4 << 20
 
 
 class DatagramLink(Link):
-    """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
+    """Link for datagrams to and from one peer: a :class:`UdpLink`, or the link of an emulated device."""
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Received:

@@ -28,7 +28,7 @@ _LARGEST_FRAME = (_HEAD.size + LARGEST_PAYLOAD + _CRC.size) * 255 // 254 + 2
 
 
 class Kind(IntEnum):
-    """Kinds of frames; a reply has its request's kind with the top bit set."""
+    """Kinds of frames, as numbers; a reply has the number of its request with the top bit set."""
 
     HELLO = 0x01
     SETUP = 0x02
@@ -117,13 +117,13 @@ def _unstuffed(stuffed: bytes) -> bytes | None:
 
 
 HELLO = struct.Struct("<HHBB")
-"""Payload of the reply to HELLO, before the name: firmware, largest payload, batches held, select lines."""
+"""Head of the reply to HELLO, before the bridge's name: firmware, largest payload, batches held, select lines."""
 SETUP = struct.Struct("<IB")
-"""Payload of SETUP and of its reply: clock in hertz, mode."""
+"""Payload of a SETUP request and of its reply: SPI clock [Hz], SPI mode."""
 STEP = struct.Struct("<BHH")
-"""Head of a step in BATCH: select, pause in us, number of bytes."""
+"""Head of each step in a BATCH request: select mask, pause [us], number of bytes."""
 BEGIN = struct.Struct("<I")
-"""Head of the reply to BATCH: its beginning, us."""
+"""Head of the reply to a BATCH request: the batch's time of beginning [us]."""
 FULL = b"full"
 """Text of the error reply to a batch for which the bridge has no room."""
 

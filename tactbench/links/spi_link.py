@@ -16,16 +16,16 @@ class SpiStep:
     """One SPI transfer: select a device, exchange bytes, release the device, pause."""
 
     data: bytes
-    """Bytes to send; as many are received. Empty: only the pause."""
+    """Bytes to send; equally many bytes are received. Empty: the step is only a pause."""
     select: int = 1
-    """Mask of the active select lines, line i being bit i; their wiring is that of the board."""
+    """Mask of the active select lines, line i being bit i; the board defines the wiring of the lines."""
     pause_us: int = 0
     """Shortest pause with no active line after the transfer [us]; up to 65535."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpiReply:
-    """The bytes received during one batch."""
+    """Reply to one batch: the bytes received, and their time."""
 
     number: int
     """Number of the batch, as returned by :meth:`SpiLink.send`."""

@@ -98,7 +98,7 @@ class Completeness:
 
     @property
     def seconds(self) -> float:
-        """Time from the first row to the last by the devices' clocks [s]."""
+        """Time between the first and the last row of all streams, by their time stamps [s]."""
         return 1e-9 * (self._end_ns - (self._begin_ns or 0))
 
     def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:

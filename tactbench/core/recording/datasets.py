@@ -39,12 +39,12 @@ FOLDER = "datasets"
 
 @dataclass(frozen=True)
 class DataSet:
-    """A public data set: a mapping file with a source, known by its name.
+    """A public data set: a mapping file that states the source of its files, found by the file's name.
 
     Parameters
     ----------
     path
-        The mapping file; the data set has its name.
+        Path of the mapping file, whose name without ending is the data set's name.
     """
 
     path: Path

@@ -36,7 +36,7 @@ Array = npt.NDArray[Any]
 Annotations = Mapping[str, Mapping[str, Array]]
 """Labels of rows, by name of the stream and of the label: (n,) texts or whole numbers."""
 Columns = dict[str, Array]
-"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
+"""Columns of a stream by name: data and quality (n, channels); t_ns [ns], sequence and device_ns [ns], (n,) each."""
 Blocks = Iterable[tuple[str, Columns]]
 """Name of the stream and columns of each block, in the order of receipt."""
 

@@ -40,9 +40,9 @@ MONOTONE = f"apart from rounding a monotone function of {{}}, at most {LAG} rows
 GLANCE = 50
 """Number of rows compared first, to reject most pairs of columns before all rows are compared."""
 WRONG_UNIT = 50.0
-"""Factor between the stated and the measured rate above which times are probably in a wrong unit."""
+"""Factor between the stated and the measured rate of a stream above which its times are probably in a wrong unit."""
 FINDINGS = "findings"
-"""Key of the provenance under which an import stores its findings."""
+"""Key in a recording's provenance under which an import stores its findings."""
 FIELDS = ("check", "severity", "message", "stream", "channels")
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
 """Checks whose findings are not shown with scores. Untouched taxels are constant and identical, pressed ones saturate;
@@ -58,11 +58,11 @@ class Finding:
     """A fault or fact found in a recording that may affect scores computed from the recording."""
 
     check: str
-    """Short name of the check, fit for a filter: stuck, dead, saturated, duplicated, missing, gaps …"""
+    """Short name of the check, for filters: stuck, dead, saturated, duplicated, missing, gaps …"""
     severity: Severity
     message: str
     stream: str = ""
-    """Name of the stream; empty: the whole recording is concerned."""
+    """Name of the stream; empty for a finding about the whole recording."""
     channels: tuple[str, ...] = ()
 
 

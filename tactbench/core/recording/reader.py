@@ -232,7 +232,7 @@ def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> 
 
 
 def _envelope(path: Path, file: Any) -> str:
-    """Return the meta of an HDF5 file as text; raises FormatError for a file that is no finished recording."""
+    """Return the meta of an HDF5 file as text; raises FormatError for a file other than a finished recording."""
     if file.attrs.get("format") != layout.FORMAT:
         raise FormatError(
             f"{path} is an HDF5 file, but not a tactbench recording.",

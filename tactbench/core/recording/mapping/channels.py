@@ -62,7 +62,7 @@ def no_translation(where: str, text: str, word: str, known: Mapping[str, str]) -
 
 
 def expand(text: Scalar) -> Iterator[Scalar]:
-    """Yield the members of a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; else the text itself."""
+    """Yield the members of a range: ``1..3`` gives 1, 2, 3; ``e_1..3`` gives e_1, e_2, e_3; other text is unchanged."""
     match = _RANGE.match(text) if isinstance(text, str) else None
     if match is None:
         yield text

@@ -321,7 +321,7 @@ def _decoder(ros: Any, channel: Any, schema: Any, shown: str) -> Callable[[bytes
 
 
 def _take(record: Any, decode: Any, topic: Topic, values: dict[Column, Any], where: str) -> None:
-    """Add the columns of one message to `values`."""
+    """Append the used fields of one message to the columns in `values`."""
     column: Column | None = None
     try:
         message = decode(record.data)

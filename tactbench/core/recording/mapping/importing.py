@@ -61,7 +61,7 @@ _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 @dataclass(frozen=True)
 class Imported:
-    """One recording that an import has written."""
+    """A recording written by an import, with its counts and findings."""
 
     path: Path
     meta: RecordingMeta
@@ -74,7 +74,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """Files and columns that an import has read, written and left out."""
+    """Report of an import: files read, recordings written, and files and columns left out."""
 
     title: str
     recordings: tuple[Imported, ...]

@@ -61,7 +61,7 @@ class Text(Tabular):
 
 
 class Records(Tabular):
-    """A text file in which several lines of numbers make a row; its columns are numbered from 0 through these lines."""
+    """A text file in which several lines of numbers make a row; columns are numbered from 0 across these lines."""
 
     format: Literal["records"] = "records"
     header: Literal[False] = False
@@ -87,7 +87,7 @@ class Arrays(Frozen):
     """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
     """Meaning of each axis of the array, in order; an axis that is left out has length 1. Several axes of channels are
-    read as one, of which the last runs fastest."""
+    read as one, of which the last axis varies fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
     """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
     the same folder, in which ``{word}`` is filled in."""
@@ -117,7 +117,7 @@ class Parquet(Frozen):
 
 
 class Time(Frozen):
-    """The clock of a table: the column with the time of each row. Times are never made up from a rate."""
+    """The clock of a table: the column with the time of each row. Times are never computed from a rate."""
 
     column: Column
     unit: str
@@ -181,7 +181,7 @@ class Word(Frozen):
     values: dict[Scalar, str] | None = None
     """Translation of the other word's values; a value that is not listed is an error."""
     divided_by: int | None = Field(default=None, ge=1)
-    """Divisor of a whole-number division, which makes blocks of consecutive numbers."""
+    """Divisor of a whole-number division of the other word, which maps consecutive numbers to one block number."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Word:
@@ -198,8 +198,8 @@ class ChannelGroup(Frozen):
     name: str
     """Name of the channel; of several columns a pattern, in which ``{column}`` or the words of `over` are filled in."""
     over: dict[Annotated[str, Field(pattern=WORD)], tuple[Scalar, ...] | str] = Field(default_factory=dict)
-    """Words and their values, a list or a range like ``1..12``: columns are named by all combinations of the values, of
-    which those of the last word run fastest."""
+    """Words and their values, a list or a range like ``1..12``: columns are named by all combinations of the values, in
+    which the last word varies fastest."""
     kind: ChannelKind
     unit: str
     """Unit in which the numbers are stored."""
@@ -274,7 +274,7 @@ class SensorDeclaration(Frozen):
     """Description of the sensor, as far as the source of the tables gives one."""
 
     name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
-    """Name of the sensor; words like ``{word}`` are filled in, so that one mapping covers several devices."""
+    """Name of the sensor; ``{word}`` is replaced by the word's value, so that one mapping covers several devices."""
     title: str
     principle: str
     principle_source: Source
@@ -284,18 +284,18 @@ class SensorDeclaration(Frozen):
 
 
 class RecordingNames(Frozen):
-    """Texts from which the name and the labels of each recording are made; words like ``{word}`` are filled in."""
+    """Texts for the name and the labels of each recording, in which ``{word}`` is replaced by the word's value."""
 
     name: str
     session: str
     trial: str = ""
     role: str = ""
-    """Role of the recording: after words are filled in, train, validation, test or empty."""
+    """Role of the recording: train, validation, test or empty, after ``{word}`` is replaced."""
     labels: dict[Annotated[str, Field(pattern=WORD)], Scalar] = Field(default_factory=dict)
 
 
 class Exclusion(Frozen):
-    """Files whose recordings are imported and marked so that no evaluation uses them."""
+    """Files whose recordings are imported, but marked as excluded from all evaluations, with the reason."""
 
     files: str
     reason: str = Field(min_length=1)
@@ -305,11 +305,11 @@ class DataSource(Frozen):
     """Address, files and licence of a public data set."""
 
     address: str = Field(default="", pattern=r"^(https?://.*/)?$")
-    """URL of the folder with `files`, in one fixed state of it; empty: the files have no public address."""
+    """URL of the folder with `files`, in a fixed version; empty: the files have no public address."""
     licence: str
     citation: str
     measured: str
-    """The measured quantity or event, in one line."""
+    """The measured quantity or event of the data set, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
     """Tasks that the recordings can answer; a command that names no task runs all of these."""
     bytes: int = Field(ge=1)
@@ -319,13 +319,13 @@ class DataSource(Frozen):
 
 
 class Mapping(Frozen):
-    """A mapping file: how the tables of a data set become recordings."""
+    """A mapping file: rules for converting the tables of a data set to recordings."""
 
     version: Literal[1]
     title: str
     sensor: SensorDeclaration
     clock: Literal["device", "host", "none"]
-    """The clock that made the times: the device's, the host's, or none."""
+    """The clock from which the times come: the device's, the host's, or none."""
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
@@ -339,9 +339,9 @@ class Mapping(Frozen):
     streams: dict[str, StreamSource] = Field(min_length=1)
     exclude: tuple[Exclusion, ...] = ()
     tasks: tuple[DeclaredTask, ...] = ()
-    """Tasks that the recordings can answer, beside the installed ones."""
+    """Tasks defined for these recordings, in addition to the installed tasks."""
     source: DataSource | None = None
-    """Source of the files; None: the mapping is for files that are there already."""
+    """Source of the files; None: the files must already be on this machine."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:

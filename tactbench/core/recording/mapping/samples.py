@@ -32,7 +32,7 @@ UNSIGNED_BITS = (8, 16, 32)
 MISSED = 0.05
 """Largest share of the longest table's time span that the tables may not have in common, without a report."""
 YEARS = (1970, 2200)
-"""Times since 1970 are taken for times in a wrong unit or epoch if they lie outside these years."""
+"""Years outside which times since 1970 count as times in a wrong unit or of a wrong epoch."""
 _NS_PER_YEAR = 365.2425 * 86400 * 1e9
 
 
@@ -122,7 +122,7 @@ def _labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]
 
 
 def translations(values: dict[Scalar, str]) -> dict[str, str]:
-    """Return the translations of texts that a mapping lists, in one form of Unicode."""
+    """Return a mapping file's translations of texts, with keys and values as texts in the same Unicode form."""
     return {composed(str(key)): composed(value) for key, value in values.items()}
 
 

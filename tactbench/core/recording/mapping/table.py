@@ -63,7 +63,7 @@ class Table:
         return replace(self, values=values, places=[self.places[row] for row in rows])
 
     def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
+        """Return the values of a column as texts, one for each row, (n,)."""
         return [plain(value) for value in self._plain(column)]
 
     def numbers(self, column: Column) -> FloatArray:
@@ -217,7 +217,7 @@ def no_column(shown: str, column: Column, columns: Sequence[Column]) -> MappingE
 
 
 def plain(value: Any) -> str:
-    """Return a number as people write it in a mapping: 1, not 1.0."""
+    """Return a value as text, whole numbers without decimals as in a mapping file: 1, not 1.0."""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
@@ -325,7 +325,7 @@ def skipped(place: int, how: Tabular) -> bool:
 
 
 def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
-    """Yield the lines that are not blank, cut into cells."""
+    """Yield the number and the cells of each line that is not blank."""
     first = next((line for line in lines if line.strip()), "")
     if first.lower().startswith("sep="):
         hint = f"Write `skiprows: {lines.index(first) + 1}` under `read`, and `delimiter: {first[4:5]!r}`."
