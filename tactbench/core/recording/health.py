@@ -253,7 +253,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     backward, doubled = int((steps < 0).sum()), int((steps == 0).sum())
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
-        text = f"times of {stream} go back at {backward} rows, first at row {row}; a counter that wraps: `wraps_at`?"
+        text = f"times of {stream} run backwards at {backward} rows, first at row {row}; a full counter: `wraps_at`?"
         yield Finding("backward", "error", text, stream)
     if doubled:
         text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the stamp before"
