@@ -1,4 +1,4 @@
-"""Links: what drivers speak through. Byte streams, CAN, datagrams and SPI that open, end and fail alike.
+"""Links between drivers and devices: byte streams, CAN, datagrams and SPI, which open, close and fail alike.
 
 See ``docs/links.md``.
 """

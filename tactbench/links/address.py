@@ -1,4 +1,4 @@
-"""Addresses of links: the text in a rig file, and the link that it names."""
+"""Addresses of links, as written in a rig file: parsing them, and opening the links that they name."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hint: str = "") -> _Model:
-    """Return the given options as a model of `what`: a device, an address.
+    """Return the given options as a validated model; `what` names their owner in messages: a device, an address.
 
     Raises
     ------
     UsageError
-        For an option that is not known, is missing, has no such value, or contradicts another.
+        If an option is unknown, is missing, has an invalid value, or contradicts another option.
     """
     for name in given:
         if name not in kind.model_fields:
@@ -77,23 +77,23 @@ def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hin
 
 
 def parse_address(text: str) -> tuple[str, str, dict[str, Any]]:
-    """Return the parts of an address ``scheme://target?key=value&key=value``; nothing is opened.
+    """Return the parts of an address ``scheme://target?key=value&key=value``, without opening the link.
 
     Returns
     -------
     kind
         A key of :data:`KINDS`.
     target
-        Port, channel, host or file; of ``can`` the interface, a slash and the channel.
+        Port, channel, host or file; for ``can`` the interface, a slash and the channel.
     options
-        Keys and values, as the link takes them.
+        Options of the link by name, converted to their types.
 
     Raises
     ------
     UnknownNameError
-        If the scheme, the kind of bus or a key is unknown; the message has the nearest ones.
+        If the scheme, the kind of bus or a key is unknown; the message names similar known ones.
     UsageError
-        If a part is missing, given twice or wrong; the message has an example.
+        If a part is missing, given twice or invalid; the hint has an example.
     """
     kind, separator, rest = text.partition("://")
     if not separator:
@@ -111,7 +111,7 @@ def parse_address(text: str) -> tuple[str, str, dict[str, Any]]:
         if (interface := target.partition("/")[0]) not in can.VALID_INTERFACES:
             raise UnknownNameError("kind of can:// link", interface, sorted(can.VALID_INTERFACES))
     if kind != "loop" and not (target.partition("/")[2] if kind == "can" else target):
-        raise _wrong(text, kind, "lacks its target")
+        raise _wrong(text, kind, "lacks a target after ://")
     if kind in ("udp", "socket") and not all(_host_and_port(target)):
         raise _wrong(text, kind, "does not end in a host and a port, 1 to 65535")
     return kind, target, _options(text, kind, query)
@@ -123,14 +123,14 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     Parameters
     ----------
     address
-        As in ``docs/links.md``.
+        Address of the link; ``docs/links.md`` describes the forms.
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
 
     Raises
     ------
     UnknownNameError, UsageError
-        If the address is not one, or an interface of python-can does not know one of the options.
+        If the address is not valid, or an interface of python-can has no such option.
     LinkError
         If the link cannot be opened.
     """
@@ -155,7 +155,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
 
 
 def _host_and_port(target: str) -> tuple[str, int]:
-    """Return host and port, empty and 0 where they are missing."""
+    """Return the host and the port in `target`; an empty text and 0 if they are missing."""
     try:
         parts = urlsplit(f"//{target}")
         return parts.hostname or "", parts.port or 0

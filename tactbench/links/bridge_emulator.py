@@ -1,6 +1,6 @@
-"""The SPI bridge as a model, fed and polled like an emulated device: bytes in, bytes out, on a clock passed in.
+"""Emulator of the SPI bridge, which like an emulated device takes and returns bytes at times given by the caller.
 
-It is the reference for the firmware, which ``docs/links.md`` specifies.
+The emulator is the reference for the bridge's firmware, which ``docs/links.md`` specifies.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from dataclasses import dataclass, field
 from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
 Exchange = Callable[[int, bytes, float], bytes]
-"""A device on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
+"""Function of a device on the bus: select mask, bytes sent, time of their beginning [s] -> as many bytes received."""
 
 
 @dataclass
 class BridgeEmulator:
-    """A bridge with one SPI bus."""
+    """Emulated bridge between a serial port and one SPI bus."""
 
     exchange: Exchange
-    """The device on the bus."""
+    """Function of the device on the bus, which computes the bytes received from those sent."""
     holds: int = 4
-    """Batches it can hold, the running one included."""
+    """Largest number of batches in the bridge, the running one included."""
     largest_payload: int = 4096
-    """Bytes of payload it can take."""
+    """Largest payload of a frame [bytes]."""
     select_lines: int = 0xFF
-    """Mask of its select lines."""
+    """Bit mask of the bridge's select lines."""
     fastest_hz: int = 10_000_000
-    """Its highest clock, hertz."""
+    """Highest SPI clock [Hz]."""
     faults: set[str] = field(default_factory=set)
     """Present faults: ``dropped`` (batches run, their replies are not sent), ``doubled`` (replies are sent twice),
     ``damaged`` (one bit of each reply is inverted)."""
@@ -42,13 +42,13 @@ class BridgeEmulator:
         self._due: deque[tuple[float, bytes]] = deque()
 
     def feed(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """Take bytes from the host and return the pieces sent by now, each with its second."""
+        """Take bytes from the host and return the replies sent until `now_s`, each with its time of sending [s]."""
         out = self.poll(now_s)
         out += [(now_s, answer) for frame in self._decoder.feed(data) if (answer := self._answered(frame, now_s))]
         return out + self.poll(now_s)
 
     def poll(self, now_s: float) -> list[tuple[float, bytes]]:
-        """Return the replies to batches that are over by `now_s`, each with the second at which its batch was over."""
+        """Return the replies to batches finished by `now_s`, each with the time at which its batch finished [s]."""
         out = []
         while self._due and self._due[0][0] <= now_s:
             t_s, reply = self._due.popleft()
@@ -57,7 +57,7 @@ class BridgeEmulator:
         return out
 
     def next_s(self) -> float:
-        """Return the time of the next reply; infinite: none is due."""
+        """Return the time of the next reply to a batch [s]; infinite: no batch is running."""
         return self._due[0][0] if self._due else math.inf
 
     def _answered(self, frame: Frame, now_s: float) -> bytes:
@@ -67,7 +67,7 @@ class BridgeEmulator:
             return encode_frame(Frame(Kind.ERROR.reply, frame.number, b"malformed or not possible"))
 
     def _executed(self, frame: Frame, now_s: float) -> bytes:
-        """Return the reply, empty where it is sent later; raises ValueError or struct.error for a refused request."""
+        """Return the reply to a request, empty if sent later; raises ValueError or struct.error for a refusal."""
         if frame.version != VERSION or len(frame.payload) > self.largest_payload:
             raise ValueError
         match Kind(frame.kind):
@@ -106,7 +106,7 @@ class BridgeEmulator:
 
 
 def _steps(payload: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield select, pause in us and bytes of each step; raises ValueError or struct.error if they are not whole."""
+    """Yield select mask, pause [us] and bytes of each step; raises ValueError or struct.error for a short step."""
     while payload:
         select, pause_us, length = STEP.unpack_from(payload)
         data, payload = payload[STEP.size : STEP.size + length], payload[STEP.size + length :]

@@ -1,4 +1,4 @@
-"""Byte streams: serial ports, pseudo-terminals, TCP sockets and other URLs of pyserial."""
+"""Links for byte streams: serial ports, pseudo-terminals, TCP sockets and other URLs of pyserial."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 
 
 class ByteLink(Link):
-    """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
+    """Link for a byte stream in both directions: a :class:`SerialLink`, or the link of an emulated device."""
 
     silence_hint = f"{Link.silence_hint} Many boards start anew when their port is opened (DTR), and need some seconds."
 
     def receive(self, timeout_s: float) -> Received:
-        """Return the result of :meth:`read`."""
+        """Return all bytes received, like :meth:`read`."""
         return self.read(timeout_s)
 
     @abstractmethod
     def read(self, timeout_s: float) -> Received:
-        """Return all bytes received, as soon as there is one; raises as every :class:`Link`."""
+        """Wait for the first byte and return all bytes received; raises the errors of every :class:`Link`."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Send `data`; raises as every :class:`Link`."""
+        """Send all bytes of `data`; raises the errors of every :class:`Link`."""
 
 
 class SerialLink(ByteLink):
-    """A byte stream of the system, by pyserial.
+    """A byte stream opened by pyserial: a serial port, a pseudo-terminal or a TCP socket.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class SerialLink(ByteLink):
     baud
         Bits per second, start and stop bits included.
     parity, stop_bits
-        Of each byte of eight data bits.
+        Parity and number of stop bits of each byte, which has eight data bits.
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""CAN: buses of python-can, and its logs."""
+"""Links to CAN buses through python-can, and reading of its log files."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from tactbench.core.errors import LinkError, UnknownNameError
 from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
 
 WAITED_S = 60.0
-"""Longest wait of a frame in a kernel's queue (assumed): an older stamp is not used."""
+"""Longest time of a frame in a kernel's queue [s] (assumed); an older time stamp is not used."""
 SYSTEMS_OWN_NS = 5_000_000
-"""Largest lag of stamps that are the system clock's own, and largest scatter of stamps that are used (assumed: a
-wake-up takes less)."""
+"""Largest lag at which time stamps count as the system clock's own, and largest scatter of stamps that are used [ns]
+(assumed: waking a process takes less)."""
 LEAST_OF = 200
-"""Frames of which at least one is read at once, where the reader waited for none (assumed)."""
+"""Number of frames of which at least one is read without delay, if the reader waited for no frame (assumed)."""
 WINDOW_NS = 5_000_000_000
-"""Length of a window; the least age is that of the current and the previous one (assumed: 1 ms at 100 ppm)."""
+"""Length of a window [ns]; the least age is that of the current and the previous window (assumed: 1 ms at 100 ppm)."""
 _HEX = r"[\dA-Fa-f]"
 _SLCAN = re.compile("|".join([
     *(rf"(?:t{_HEX}{{3}}|[Tx]{_HEX}{{8}}){n}{_HEX}{{{2 * n}}}(?:{_HEX}{{4}}(?=[tTrRx]|$))?" for n in range(9)),
     rf"(?:r{_HEX}{{3}}|R{_HEX}{{8}})[0-8]",
 ]))  # fmt: skip
-"""A data frame of n bytes, with or without the adapter's milliseconds behind it, or a remote frame."""
+"""Pattern of an slcan data frame of n bytes, with or without the adapter's milliseconds, or of a remote frame."""
 
 
 def _raised(*others: type[Exception]) -> tuple[type[Exception], ...]:
-    """Return the errors of python-can and of the system, and others."""
+    """Return the error classes of python-can and of the system, and `others`."""
     import can
 
     return (can.CanError, *SYSTEM_ERRORS, *others)
@@ -43,24 +43,24 @@ def _raised(*others: type[Exception]) -> tuple[type[Exception], ...]:
 
 @dataclass(frozen=True, slots=True)
 class CanFrame:
-    """A data frame."""
+    """A CAN data frame."""
 
     id: int
-    """11 bits, or 29 if `extended`."""
+    """Identifier of 11 bits, or 29 if `extended`."""
     data: bytes
-    """At most 8 bytes."""
+    """Payload of at most 8 bytes."""
     extended: bool = False
     t_ns: int = 0
-    """Receipt by kernel or adapter, nanoseconds of the link's clock; of a log: since its first frame. Not sent."""
+    """Time of receipt by kernel or adapter [ns of the link's clock; in a log, since its first message]. Not sent."""
 
 
 class CanLink(Link):
-    """Frames to and from a CAN bus: a :class:`CanBus`, or an emulated device's.
+    """Link for frames to and from a CAN bus: a :class:`CanBus`, or the link of an emulated device.
 
     Attributes
     ----------
     counts
-        Frames left out: ``error frames``, ``remote and FD frames``, ``unreadable frames``.
+        Numbers of frames left out, by kind: ``error frames``, ``remote and FD frames``, ``unreadable frames``.
     """
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
@@ -69,17 +69,17 @@ class CanLink(Link):
 
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame; raises as every :class:`Link`."""
+        """Return the next data frame; raises the errors of every :class:`Link`."""
 
     @abstractmethod
     def send(self, frame: CanFrame) -> None:
-        """Send a data frame; raises as every :class:`Link`, LinkTimeout also where no node acknowledges."""
+        """Send a data frame; raises the errors of every :class:`Link`, LinkTimeout also if no node acknowledges."""
 
     def _sendable(self, frame: CanFrame) -> None:
         super()._sendable(frame)
         if not 0 <= frame.id < 1 << (29 if frame.extended else 11) or len(frame.data) > 8:
             raise LinkError(
-                f"{self.address}: {frame} is not a CAN frame.",
+                f"{self.address}: {frame} is not a valid CAN frame.",
                 hint="An identifier has 11 bits (29 if extended), the data at most 8 bytes.",
             )
 
@@ -97,11 +97,11 @@ def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | Non
 
 
 class _Stamps:
-    """Puts python-can's stamps, seconds since 1970 or since an adapter's start, on a link's clock.
+    """Conversion of python-can's time stamps, seconds since 1970 or since an adapter's start, to a link's clock.
 
-    A stamp's age is the system's time at receipt less the stamp. A frame that the reader waited for was just received,
-    and so was at least one of some hundred: the least recent age is the lag of the stamps' clock. If the system's clock
-    is set meanwhile, queued frames have stamps of before: their age is by the clock that makes it least.
+    A stamp's age is the system's time at reading less the stamp. A frame for which the reader waited is read at once,
+    and so is at least one of some hundred: the least age of late is the lag of the stamps' clock. If the system's clock
+    is set, queued frames have stamps of the old clock: their age is computed by the clock that makes it least.
     """
 
     def __init__(self, clock: Clock, wall: Clock = time.time_ns) -> None:
@@ -110,20 +110,20 @@ class _Stamps:
         self._least: deque[tuple[int, int]] = deque(maxlen=2)
         self._seen, self._known = 0, False
         self._late: deque[int] = deque(maxlen=31)
-        """Age of the frames that the reader waited for, less the least age."""
+        """Ages of the frames for which the reader waited, less the least age [ns]."""
 
     @property
     def refused(self) -> bool:
-        """Whether stamps scatter too much to be used: half of the frames that were just received have old ones."""
+        """True if stamps scatter too much to be used: half of the frames that were read at once have old stamps."""
         return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
 
     def lag_ns(self) -> int:
-        """Return the lag of the stamps' clock behind the system's; 0 if it is that clock, or not known yet."""
+        """Return the lag of the stamps' clock behind the system's [ns]; 0 if both are one clock, or not known yet."""
         least_ns = min((least_ns for _, least_ns in self._least), default=0)
         return least_ns if self._known and abs(least_ns) > SYSTEMS_OWN_NS else 0
 
     def __call__(self, stamp_s: float, *, waited: bool) -> int:
-        """Return the time of receipt of a frame; `waited`: whether the reader waited for it."""
+        """Return a frame's time of receipt [ns of the link's clock]; `waited`: True if the reader waited for it."""
         now_ns, lag_ns = self._clock(), self.lag_ns()
         wall_ns = self._wall() - now_ns
         if self._walls and abs(wall_ns - self._walls[-1]) < SYSTEMS_OWN_NS:
@@ -148,17 +148,17 @@ class _Stamps:
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
-    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), put on the link's clock. Where
-    stamps lag behind the system's clock, the least age is taken off, and such frames are counted.
+    A frame's time is its ``Message.timestamp`` (for socketcan, the kernel's), converted to the link's clock. If stamps
+    lag behind the system's clock, the lag is removed, and the frames are counted.
 
     Parameters
     ----------
     interface, channel
-        As python-can names them: ``socketcan`` with ``can0``, ``pcan`` with ``PCAN_USBBUS1``, ``slcan`` with a port …
+        Names in python-can: ``socketcan`` with ``can0``, ``pcan`` with ``PCAN_USBBUS1``, ``slcan`` with a port …
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
     options
-        Of the interface, by python-can's names: ``bitrate``, ``tty_baudrate``, ``port`` …
+        Options of the interface, by python-can's names: ``bitrate``, ``tty_baudrate``, ``port`` …
 
     Raises
     ------
@@ -214,10 +214,10 @@ class CanBus(CanLink):
         raise self._nothing_came(timeout_s)
 
     def _slcan_frame(self, timeout_s: float | None) -> str | None:
-        """Return the next frame of python-can's slcan, which takes the bytes between two CR or BEL for one.
+        """Return the next frame of python-can's slcan, which takes all bytes between two CR or BEL for one frame.
 
-        Line feeds are left out; frames whose CR was lost are separated; other bytes are counted, and so is BEL, by
-        which an adapter reports an error.
+        Line feeds are removed; frames whose CR was lost are separated; stretches with other bytes are counted, and so
+        is BEL, by which an adapter reports an error.
         """
         line: str | None = self._read_line(timeout_s)
         if not line:
@@ -262,15 +262,15 @@ class CanBus(CanLink):
 
 
 def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
-    """Return the data frames of a log in any format of python-can, and what was left out (:class:`CanLink`).
+    """Return the data frames of a log in a format of python-can, and `counts` of frames left out (:class:`CanLink`).
 
-    Stamps are nanoseconds since the log's first message. BLF stamps come within 0.25 us, since python-can returns
-    float64.
+    Time stamps are nanoseconds since the log's first message. Stamps of BLF files are exact to 0.25 us only, since
+    python-can returns float64.
 
     Parameters
     ----------
     file
-        Ends in ``.log`` (candump), ``.asc``, ``.blf``, ``.csv``, ``.trc`` …
+        Log file whose name ends in ``.log`` (candump), ``.asc``, ``.blf``, ``.csv``, ``.trc`` …
 
     Raises
     ------
@@ -285,7 +285,7 @@ def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
     number, began_s = 0, None
     try:
         if file.suffix.lower() == ".asc" and b"timestamps relative" in b" ".join(file.read_bytes()[:4096].split()):
-            raise ValueError("its times are relative to the event before; export it with absolute ones")
+            raise ValueError("its times are relative to the event before; export it with absolute times")
         with can.LogReader(file) as log:
             for number, message in enumerate(log, 1):  # noqa: B007  (said where it is damaged)
                 began_s = message.timestamp if began_s is None else began_s
@@ -300,7 +300,7 @@ def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
 
 def _hint(interface: str, channel: str, error: BaseException) -> str:
     if interface == "slcan" and not channel.startswith("/"):
-        return "A port begins with a slash of its own: can://slcan//dev/ttyACM0."
+        return "Write the port with its own slash: can://slcan//dev/ttyACM0."
     if os_error_in(error) is not None:
         return ""
-    return f"See python-can's page of the interface {interface} for its channels, options and what it needs."
+    return f"See python-can's page of the interface {interface} for its channels, options and requirements."

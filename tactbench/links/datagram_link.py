@@ -1,4 +1,4 @@
-"""Datagrams, over UDP or to an emulated device."""
+"""Links for datagrams, over UDP or to an emulated device."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from contextlib import ExitStack
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
 
 LARGEST_DATAGRAM = 65507
-"""Bytes: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
+"""Largest payload [bytes]: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
 BUFFER_BYTES = 4 << 20
-"""Requested size of the system's buffer, which may be smaller. The usual 212 992 hold 256 datagrams of 36 bytes, a
-quarter of a second at 1 kHz (measured on Linux); datagrams that do not fit are lost without an error."""
+"""Requested size of the system's buffer [bytes]; the real one may be smaller. The usual 212 992 hold 256 datagrams of
+36 bytes, a quarter of a second at 1 kHz (measured on Linux); datagrams that do not fit are lost without an error."""
 
 
 class DatagramLink(Link):
-    """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
+    """Link for datagrams to and from one peer: a :class:`UdpLink`, or the link of an emulated device."""
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Received:
-        """Return the next datagram, whole; raises as every :class:`Link`.
+        """Return the next datagram, whole; raises the errors of every :class:`Link`.
 
-        It is unplugged where the peer's host reports that the port is closed.
+        Raises LinkUnplugged if the peer's host reports that its port is closed.
         """
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send one datagram; raises as every :class:`Link`."""
+        """Send one datagram; raises the errors of every :class:`Link`."""
 
 
 class UdpLink(DatagramLink):
-    """Datagrams to and from one peer over UDP; those of others are not received.
+    """Datagrams to and from one peer over UDP; datagrams from other hosts are not received.
 
     Parameters
     ----------
     host, port
-        The peer.
+        Host name or address of the peer, and its UDP port.
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
 
     Raises
     ------
     LinkError
-        If the host has no address.
+        If no address is found for the host.
     """
 
     def __init__(self, host: str, port: int, *, clock: Clock = time.monotonic_ns) -> None:

@@ -1,4 +1,4 @@
-"""The base of all links: open when made, closed once, and a named error for each kind of failure."""
+"""Base class of all links, which are open when made, closed once, and have a named error for each kind of failure."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ try:
     SYSTEM_ERRORS: tuple[type[Exception], ...] = (OSError, termios.error)
 except ImportError:  # Windows has none
     SYSTEM_ERRORS = (OSError,)
-"""Errors of the system: that of terminals is no OSError, and passes through pyserial where a port has gone."""
+"""Error classes of the system; `termios.error` is no OSError, and comes through pyserial when a port disappears."""
 
 Clock = Callable[[], int]
-"""Returns nanoseconds of a clock that never goes back, as :func:`time.monotonic_ns` does."""
+"""Function that returns the nanoseconds of a clock that never goes back, like :func:`time.monotonic_ns`."""
 
 WRITE_TIMEOUT_S = 1.0
-"""Longest time in which the other end takes data (assumed; 9600 baud carry 960 bytes in it)."""
+"""Longest wait until the other end takes written data [s] (assumed; 9600 baud carry 960 bytes in 1 s)."""
 
 MOST_AT_ONCE = 4096
-"""Pieces of one :meth:`Link.receive_all`, 4 s at 1 kHz: it returns also from a bus that never rests."""
+"""Largest number of pieces that :meth:`Link.receive_all` returns, 4 s at 1 kHz, even if a bus is never idle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """Bytes and the time of receipt of the first of them."""
+    """Bytes received, and the time of receipt of the first byte."""
 
     data: bytes
     t_ns: int
-    """Nanoseconds of the link's clock."""
+    """Time of receipt [ns of the link's clock]."""
 
 
 class Link(ABC):
-    """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
+    """A connection to a device, open from its creation until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a link. Timeouts are counted by :meth:`timer`, whatever the clock; with 0 a read returns at once.
+    Only one thread may use a link. Timeouts are measured by :meth:`timer`; a read with timeout 0 returns at once.
     Every read and write raises LinkTimeout if nothing was received or taken in time (:data:`WRITE_TIMEOUT_S` for
-    writes), LinkUnplugged if device or other end is gone, LinkClosed once it was closed, and LinkError otherwise.
+    writes), LinkUnplugged if device or other end is gone, LinkClosed if the link was closed, and LinkError otherwise.
 
     Parameters
     ----------
     address
-        Its name in messages.
+        Name of the link in messages.
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
     """
 
-    silence_hint = "Is the device on, started and set to the same speed? Then wait longer."
+    silence_hint = "Check that the device is on, started and set to the same speed, or wait longer."
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
         self.address = address
@@ -70,19 +70,19 @@ class Link(ABC):
         self.close()
 
     def close(self) -> None:
-        """Close the link; once closed, or unplugged and closed, this does nothing."""
+        """Close the link, also an unplugged one; on a closed link, do nothing."""
         if not self._closed:
             self._closed = True
             self._release()
 
     def timer(self) -> float:
-        """Return the seconds of its timeouts: real ones, or virtual ones where time is virtual."""
+        """Return the time by which timeouts are measured [s]: real time, or virtual time of an emulation."""
         return time.monotonic()
 
     def receive_all(self, timeout_s: float) -> list[Any]:
-        """Return all pieces received, waiting at most so long for the first; an empty list: there is none.
+        """Return all pieces received, waiting at most `timeout_s` for the first; an empty list if none is received.
 
-        Raises as a read does; pieces received before the link was unplugged are returned first.
+        Raises the errors of a read except LinkTimeout; pieces received before unplugging are returned first.
         """
         found: list[Any] = []
         with suppress(LinkTimeout):
@@ -96,12 +96,12 @@ class Link(ABC):
         return found
 
     def discard(self) -> None:
-        """Drop all pieces received so far, not those still under way. Raises as a read does."""
+        """Drop all pieces received so far, but not pieces still under way; raises the errors of a read."""
         self.receive_all(0.0)
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Any:
-        """Return the next piece, waiting for it at most so long."""
+        """Return the next piece received, waiting for it at most `timeout_s`."""
 
     def _sendable(self, piece: Any) -> None:
         """Raise LinkError for a link that is closed or unplugged, and for a piece that cannot be sent."""
@@ -109,17 +109,17 @@ class Link(ABC):
 
     @abstractmethod
     def _release(self) -> None:
-        """Release the link's resources; called once, also after the other end is gone, and raises nothing."""
+        """Release the link's resources, also after the other end is gone; called once, and must not raise."""
 
     def _usable(self, timeout_s: float = 0.0) -> float:
-        """Return the end of a wait of `timeout_s`, in seconds of :meth:`timer`; raises as every :class:`Link`."""
+        """Return the end of a wait of `timeout_s`, in seconds of :meth:`timer`; raises the errors of every link."""
         if self._closed:
-            raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
+            raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new link.")
         if self._loss is not None:
             raise self._unplugged(self._loss)
         if not 0 <= timeout_s < math.inf:
             raise LinkError(
-                f"{self.address}: the timeout is {timeout_s} s; a finite one of 0 or more was expected.",
+                f"{self.address}: the timeout is {timeout_s} s; a finite timeout of 0 s or more was expected.",
                 hint="Use 0 to return at once.",
             )
         return self.timer() + timeout_s
@@ -128,7 +128,7 @@ class Link(ABC):
         self._loss = cause
         return LinkUnplugged(
             f"The other end of {self.address} is gone: {cause}.",
-            hint="Check cable, power and other end, close this link and open a new one.",
+            hint="Check cable, power and other end, close this link and open a new link.",
         )
 
     def _nothing_came(self, timeout_s: float) -> LinkTimeout:
@@ -140,24 +140,24 @@ class Link(ABC):
     def _not_sent(self, cause: BaseException) -> LinkTimeout:
         return LinkTimeout(
             f"{self.address} did not take all data within {WRITE_TIMEOUT_S:g} s ({cause}); part may have been sent.",
-            hint="Is the other end reading, or, on CAN, does any node acknowledge?",
+            hint="Check that the other end reads or, on CAN, that another node acknowledges frames.",
         )
 
 
 _HINTS = {
     errno.ENOENT: "Check the name and the cable; `python -m serial.tools.list_ports` lists serial ports.",
-    errno.EACCES: "Your user may not open it: join the group that owns the device (often dialout) and log in again.",
-    errno.EAGAIN: "Another program has it open: end that one.",
-    errno.EBUSY: "Another program has it open: end that one.",
-    errno.EADDRINUSE: "Another program uses this local port: end that one, or choose another port.",
-    errno.EAFNOSUPPORT: "This machine's kernel does not have that kind of network; CAN needs Linux with CONFIG_CAN.",
-    errno.ENODEV: "There is no such interface; `ip link` lists them.",
-    errno.ECONNREFUSED: "Nothing listens there: check host and port, and that the device is on.",
+    errno.EACCES: "Your user may not open the device: join the group that owns it (often dialout) and log in again.",
+    errno.EAGAIN: "Another program has the device open: end that program.",
+    errno.EBUSY: "Another program has the device open: end that program.",
+    errno.EADDRINUSE: "Another program uses this local port: end that program, or choose another port.",
+    errno.EAFNOSUPPORT: "This machine's kernel lacks this kind of network; CAN needs Linux with CONFIG_CAN.",
+    errno.ENODEV: "There is no such network interface; `ip link` lists all interfaces.",
+    errno.ECONNREFUSED: "No program listens at this host and port: check both, and that the device is on.",
 }
 
 
 def os_error_in(error: BaseException) -> OSError | None:
-    """Return the system's error that `error` is or was raised from; the innermost with a number, if one has."""
+    """Return the system's error that is, or caused, `error`: the innermost one with an error number, if any has one."""
     found: OSError | None = None
     cause: BaseException | None = error
     while cause is not None:
@@ -169,7 +169,7 @@ def os_error_in(error: BaseException) -> OSError | None:
 
 
 def cannot_open(address: str, error: BaseException, *, hint: str = "") -> LinkError:
-    """Return the error of a link that does not open, with a hint for the system's reason."""
+    """Return the error for a link that cannot be opened, with a hint for the system's reason."""
     reason = os_error_in(error)
     number = reason.errno if reason is not None and reason.errno is not None else 0
     return LinkError(f"{address} cannot be opened: {error}.", hint=hint or _HINTS.get(number, "Check its address."))

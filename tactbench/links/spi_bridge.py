@@ -1,8 +1,8 @@
-"""SPI behind a microcontroller that speaks our bridge's frames over a serial port.
+"""SPI bus behind a microcontroller, the bridge, which exchanges frames with the host over a serial port.
 
-The format is this project's own, version 1; ``docs/links.md`` specifies it. Zero bytes stand between frames and nowhere
+Version 1 of this project's frame format is specified in ``docs/links.md``. Zero bytes stand between frames and nowhere
 else (consistent overhead byte stuffing, S. Cheshire and M. Baker, IEEE/ACM Transactions on Networking 7(2), 1999), so
-that a reader is in step again with the first frame after a fault.
+that after a fault the next frame is read correctly again.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ LARGEST_PAYLOAD = 0xFFFF
 _HEAD = struct.Struct("<BBHH")
 _CRC = struct.Struct("<I")
 _LARGEST_FRAME = (_HEAD.size + LARGEST_PAYLOAD + _CRC.size) * 255 // 254 + 2
-"""Bytes: stuffing adds one to each 254 and one more."""
+"""Size of the largest frame [bytes]: stuffing adds one byte to each 254 bytes, and one more."""
 
 
 class Kind(IntEnum):
-    """Kinds of frames; a reply has its request's kind with the top bit set."""
+    """Kinds of frames, as numbers; a reply has the number of its request with the top bit set."""
 
     HELLO = 0x01
     SETUP = 0x02
@@ -37,17 +37,17 @@ class Kind(IntEnum):
 
     @property
     def reply(self) -> int:
-        """The kind of the reply."""
+        """Code of the frame that replies to a request of this kind."""
         return self | 0x80
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A frame whose length and CRC are right."""
+    """A frame with correct length and CRC."""
 
     kind: int
     number: int
-    """Of the request; its reply has the same."""
+    """Number of the request; the reply has the same number."""
     payload: bytes = b""
     version: int = VERSION
 
@@ -59,12 +59,12 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 class FrameDecoder:
-    """Frames from bytes as they come.
+    """Decoder of frames from pieces of received bytes.
 
     Attributes
     ----------
     damaged
-        Number of stretches between two zero bytes that were no frame.
+        Number of stretches between two zero bytes that were not valid frames.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class FrameDecoder:
         self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes, and count stretches that are no frame."""
+        """Return the frames that `data` completes; count stretches that are not valid frames in `damaged`."""
         *ended, rest = (self._pending + data).split(b"\0")
         self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
         found = [_frame_in(stuffed) for stuffed in ended if stuffed]
@@ -117,50 +117,50 @@ def _unstuffed(stuffed: bytes) -> bytes | None:
 
 
 HELLO = struct.Struct("<HHBB")
-"""Payload of the reply to HELLO, before the name: firmware, largest payload, batches held, select lines."""
+"""Head of the reply to HELLO, before the bridge's name: firmware, largest payload, batches held, select lines."""
 SETUP = struct.Struct("<IB")
-"""Payload of SETUP and of its reply: clock in hertz, mode."""
+"""Payload of a SETUP request and of its reply: SPI clock [Hz], SPI mode."""
 STEP = struct.Struct("<BHH")
-"""Head of a step in BATCH: select, pause in us, number of bytes."""
+"""Head of each step in a BATCH request: select mask, pause [us], number of bytes."""
 BEGIN = struct.Struct("<I")
-"""Head of the reply to BATCH: its beginning, us."""
+"""Head of the reply to a BATCH request: the batch's time of beginning [us]."""
 FULL = b"full"
-"""Text of the refusal of a batch that the bridge cannot hold."""
+"""Text of the error reply to a batch for which the bridge has no room."""
 
 _ASK_S = 0.2
-"""Period of HELLO until the bridge answers (assumed)."""
+"""Time between HELLO requests until the bridge answers [s] (assumed)."""
 
 
 class SpiBridge(SpiLink):
-    """An SPI bus behind a bridge of our format, version 1 (``docs/links.md``).
+    """An SPI bus behind a bridge that uses this project's frame format, version 1 (``docs/links.md``).
 
     Parameters
     ----------
     port
-        The bridge's port, open; it is closed with this link, or if this link cannot be made. Times of receipt and
-        timeouts are by its clock and timer.
+        Open port of the bridge, closed with this link, or if this link cannot be made. The port's clock and timer give
+        the times of receipt and the timeouts.
     speed_hz
-        Clock of the SPI bus, at most, hertz.
+        Highest permitted clock of the SPI bus [Hz].
     mode
         SPI mode, 0 to 3.
     wake_s
-        Longest time until the bridge answers: many microcontrollers start anew when their port is opened.
+        Longest time until the bridge answers [s]: many microcontrollers start anew when their port is opened.
 
     Attributes
     ----------
     name, firmware
-        The bridge's own.
+        Name and firmware version that the bridge reports.
     select_lines
-        Mask of its select lines.
+        Bit mask of the bridge's select lines.
     speed_hz
-        Its SPI clock, hertz.
+        Clock of the SPI bus as the bridge has set it [Hz].
     holds
-        Batches it holds, the running one included.
+        Largest number of batches in the bridge, the running one included.
 
     Raises
     ------
     LinkError
-        If nothing answers, or the bridge speaks another version or cannot do `mode`.
+        If no bridge answers, or the bridge uses another format version or does not support `mode`.
     """
 
     def __init__(self, port: ByteLink, *, speed_hz: int, mode: int = 0, wake_s: float = 3.0) -> None:
@@ -180,7 +180,7 @@ class SpiBridge(SpiLink):
             raise
 
     def timer(self) -> float:
-        """Return the seconds of the port's timeouts."""
+        """Return the time by which the port's timeouts are measured [s]."""
         return self._bytes.timer()
 
     def _greet(self, wake_s: float) -> None:
@@ -193,7 +193,7 @@ class SpiBridge(SpiLink):
                 if self.timer() >= deadline:
                     raise LinkError(
                         f"{self.address}: no SPI bridge answered within {wake_s:g} s.",
-                        hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
+                        hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
                     ) from error
         if len(hello.payload) < HELLO.size:
             raise self._nonsense(hello)
@@ -201,14 +201,14 @@ class SpiBridge(SpiLink):
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
 
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
-        """Send a request that is no batch, and return its reply; other frames are dropped."""
+        """Send a request other than a batch, and return the reply; other frames are dropped."""
         self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
         deadline = self.timer() + timeout_s
         while True:
             frame, _ = self._next(timeout_s, deadline)
             if frame.version != VERSION:
                 raise LinkError(
-                    f"{self.address}: the bridge speaks version {frame.version} of the format, expected is {VERSION}.",
+                    f"{self.address}: the bridge uses version {frame.version} of the format, expected is {VERSION}.",
                     hint="Update the bridge's firmware, or tactbench.",
                 )
             if frame.kind == Kind.ERROR.reply:
@@ -217,7 +217,7 @@ class SpiBridge(SpiLink):
                 return frame
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
-        """Return the next frame and the time of receipt of its end."""
+        """Return the next frame, and the time of receipt of its last byte [ns]."""
         while not self._frames:
             left_s = deadline - self.timer()
             try:
@@ -232,8 +232,8 @@ class SpiBridge(SpiLink):
         payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
         if len(payload) > self._largest:
             raise LinkError(
-                f"{self.address}: the batch has {len(payload)} bytes, the bridge takes {self._largest}.",
-                hint="Send it in parts.",
+                f"{self.address}: the batch has {len(payload)} bytes, the bridge takes {self._largest} at most.",
+                hint="Send the steps in several batches.",
             )
         self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
@@ -271,8 +271,8 @@ class SpiBridge(SpiLink):
 
     def _nonsense(self, frame: Frame) -> LinkError:
         return LinkError(
-            f"{self.address}: the bridge's reply to request {frame.number} has a wrong length, {len(frame.payload)}.",
-            hint="Is its firmware that of docs/links.md?",
+            f"{self.address}: the bridge's reply to request {frame.number} has a wrong length: {len(frame.payload)}.",
+            hint="Check that the bridge runs the firmware of docs/links.md.",
         )
 
     def _release(self) -> None:

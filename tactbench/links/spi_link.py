@@ -1,4 +1,4 @@
-"""SPI: batches of transfers to devices behind an adapter, or on a Linux machine's own bus."""
+"""SPI links: batches of transfers to devices behind an adapter, or on a Linux machine's own bus."""
 
 from __future__ import annotations
 
@@ -13,43 +13,43 @@ from tactbench.links.link import Clock, Link, cannot_open
 
 @dataclass(frozen=True, slots=True)
 class SpiStep:
-    """One transfer: select, exchange bytes, release, pause."""
+    """One SPI transfer: select a device, exchange bytes, release the device, pause."""
 
     data: bytes
-    """Bytes to send; as many are received. Empty: only the pause."""
+    """Bytes to send; equally many bytes are received. Empty: the step is only a pause."""
     select: int = 1
-    """Mask of the active select lines, line i being bit i; their wiring is that of the board."""
+    """Mask of the active select lines, line i being bit i; the board defines the wiring of the lines."""
     pause_us: int = 0
-    """Microseconds that no line is active afterwards, at least; up to 65535."""
+    """Shortest pause with no active line after the transfer [us]; up to 65535."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpiReply:
-    """The bytes received during one batch."""
+    """Reply to one batch: the bytes received, and their time."""
 
     number: int
-    """The number that :meth:`SpiLink.send` returned for it."""
+    """Number of the batch, as returned by :meth:`SpiLink.send`."""
     data: tuple[bytes, ...]
-    """As many as the batch has steps, each as long as its step's data."""
+    """Received bytes, one entry for each step of the batch, as long as the data sent in this step."""
     t_ns: int
-    """Time of receipt, nanoseconds of the link's clock."""
+    """Time of receipt [ns of the link's clock]."""
     device_us: int | None = None
-    """Beginning of the batch by the adapter's own counter of microseconds, modulo 2**32; None: it has none."""
+    """Beginning of the batch by the adapter's own counter of microseconds, modulo 2**32; None: no counter."""
 
 
 class SpiLink(Link):
-    """Batches to an SPI bus, and their replies in the same order.
+    """Link to an SPI bus, for batches of transfers and their replies in the same order.
 
-    The adapter executes a batch without the host, so that pauses of some ten microseconds hold; the next may be sent
-    before the reply to the last one is received. An adapter of another kind is a subclass with :meth:`send`,
+    The adapter executes a batch without the host, so that pauses of some ten microseconds are kept; the next batch may
+    be sent before the last reply is received. For another kind of adapter, write a subclass with :meth:`send`,
     :meth:`receive`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
 
     Attributes
     ----------
     speed_hz
-        The SPI clock it runs, hertz.
+        Clock of the SPI bus [Hz].
     holds
-        Batches that may be sent before the first of them is answered; 1 where :meth:`send` itself executes them.
+        Largest number of batches sent and not yet answered; 1 if :meth:`send` itself executes a batch.
     """
 
     speed_hz: int
@@ -59,18 +59,18 @@ class SpiLink(Link):
 
     @abstractmethod
     def send(self, steps: Sequence[SpiStep]) -> int:
-        """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` at once.
+        """Send a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` may be unanswered.
 
-        Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. Other refusals of the adapter
-        are raised by :meth:`receive`.
+        Raises the errors of every :class:`Link`, LinkError if the batch is longer than the adapter takes. Other
+        refusals of the adapter are raised by :meth:`receive`.
         """
 
     @abstractmethod
     def receive(self, timeout_s: float) -> SpiReply:
-        """Return the next reply, raising as every :class:`Link`; the number of a lost one is missing."""
+        """Return the next reply; the number of a lost reply is skipped. Raises the errors of every :class:`Link`."""
 
     def abandon(self) -> None:
-        """Give up all outstanding replies; late ones are dropped. Raises nothing."""
+        """Stop waiting for all outstanding replies; late replies are dropped. Raises nothing."""
 
     def _next_number(self) -> int:
         self._usable()
@@ -79,21 +79,21 @@ class SpiLink(Link):
 
 
 class SpidevLink(SpiLink):
-    """A device ``/dev/spidevBUS.SELECT``.
+    """SPI bus of a Linux machine, through ``/dev/spidevBUS.SELECT``.
 
     This process executes a batch when it is sent: pauses are at least as long as requested, and longer when the system
-    has other work. Never run on a real device.
+    has other work. Not yet tested with a real device.
 
     Parameters
     ----------
     device
-        Bus and select line, ``0.0``. Linux activates one line at a time: `select` of a step is 1.
+        Bus and select line, like ``0.0``. Linux activates one line at a time: `select` of a step is 1.
     speed_hz
-        Clock of the bus, hertz.
+        Clock of the SPI bus [Hz].
     mode
         SPI mode, 0 to 3.
     clock
-        Gives the times of receipt.
+        Function that returns the times of receipt [ns].
 
     Raises
     ------
@@ -116,7 +116,7 @@ class SpidevLink(SpiLink):
         except OSError as error:
             raise cannot_open(self.address, error) from error
         except (ImportError, ValueError, TypeError) as error:
-            hint = "Write spi://spidev/BUS.LINE; it needs pip install 'tactbench[spi]' (Linux only)."
+            hint = "Write spi://spidev/BUS.LINE, and run pip install 'tactbench[spi]' (Linux only)."
             raise cannot_open(self.address, error, hint=hint) from error
 
     def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)

@@ -49,7 +49,7 @@ def test_other_frames_are_counted_and_left_out():
 
 @pytest.mark.parametrize("frame", [CanFrame(0x800, b""), CanFrame(1, bytes(9)), CanFrame(1 << 29, b"", extended=True)])
 def test_what_is_no_frame_is_refused(frame):
-    with open_link("can://virtual/c") as link, pytest.raises(LinkError, match="not a CAN frame"):
+    with open_link("can://virtual/c") as link, pytest.raises(LinkError, match="not a valid CAN frame"):
         link.send(frame)
 
 
@@ -201,7 +201,7 @@ LINE = "   0.{} 1  4E0             Rx   d 1 {}\n"
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("log.asc", HEAD.format("relative") + LINE.format("02", "40"), "absolute ones"),
+        ("log.asc", HEAD.format("relative") + LINE.format("02", "40"), "absolute times"),
         ("log.asc", HEAD.format("absolute") + LINE.format("00", "40") + LINE.format("01", "ZZ"), "after 1 frames"),
         ("log.txt", "", "log.txt"),
     ],

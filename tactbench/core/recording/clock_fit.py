@@ -1,12 +1,12 @@
 """Conversion of a device's times to the host's clock, from the times at which its samples were received.
 
-A sample comes later than it was taken, by at least the least delay of its way and by a varying time on top. So the line
-that takes device times to host times lies below all stamps and touches those that came soonest: an edge of their lower
-convex hull, while a least-squares line follows the delays. Moon, Skelly and Towsley 1999 and Zhang, Liu and Xia 2002
-[sourced: abstracts]; that the edge over the middle is the line below all points with the least sum of distances is the
-dual of their linear program [derived].
+A sample is received later than it was taken, by a constant least delay and a varying delay. So the line that converts
+device times to host times lies below all (device, host) points and touches those of least delay: an edge of the points'
+lower convex hull, while a least-squares line follows the mean delay. Moon, Skelly and Towsley 1999 and Zhang, Liu and
+Xia 2002 [sourced: abstracts]; the dual of their linear program shows that the hull edge over the middle is the line
+below all points with the least sum of distances [derived].
 
-A recording stores the host's times, put there by such lines where the device has a clock of its own.
+A recording stores times of the host's clock; for devices with a clock of their own, such lines compute these times.
 """
 
 from __future__ import annotations
@@ -22,39 +22,39 @@ from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, RecordingMeta, StreamClock
 
 STRETCH_NS = 30_000_000_000
-"""Length of the stretch that one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s, one line over 600 s
-errs by 190 us, lines over 30 s by some us [measured: studies/clock_fit.py]. Shorter stretches hold fewer of the least
-delays."""
+"""Length of the stretch to which one line is fitted [ns]. Clock rates vary: at 1 ppm with a period of 600 s, one line
+over 600 s errs by 190 us, lines over 30 s by some us [measured: studies/clock_fit.py]. Shorter stretches have fewer
+samples of least delay."""
 LEAP_NS = STRETCH_NS // 2
-"""A longer step of the device's times begins a new run of lines, as two stretches would not overlap."""
+"""Step of the device's times [ns] above which a new run of lines begins, as two stretches would not overlap."""
 WINDOWS = 6
-"""Number of windows of a stretch whose residuals give the bound of a line."""
+"""Number of windows into which a stretch is divided to compute the error bound of its line."""
 LOWEST = 10
-"""Number of least residuals of a window that show how near they come to the least delay."""
+"""Number of smallest residuals in each window from which the error bound is computed."""
 _SLACK_NS = 1e-3
-"""A residual below minus this lies below the line; float64 holds the residuals of a stretch to 1e-5 ns [derived]."""
+"""Distance [ns] below a line up to which a point counts as on it; float64 rounds residuals to 1e-5 ns [derived]."""
 
 MOST_DRIFT, JITTER_NS = 1e-2, 100_000_000
-"""Largest relative error of a device's clock, a hundred times that of a quartz, and largest delay of the host's stamps,
-which makes a slope over a short time uncertain (assumed)."""
+"""Largest relative rate error of a device's clock, a hundred times a quartz clock's, and largest delay of the host's
+time stamps [ns], because of which a slope over a short time is uncertain (assumed)."""
 
 
 def wrong_rate(stream: str, drift: float, lasts_ns: int) -> str:
-    """Return a sentence about a clock whose line over some time has a wrong slope; empty if it may be right."""
+    """Return a message about a device's clock with an impossible rate error `drift`; empty if the error is possible."""
     if abs(drift) * lasts_ns / max(1.0, abs(drift)) < JITTER_NS or abs(drift) <= MOST_DRIFT:
         return ""
-    return f"a second of the clock of {stream} takes {1 + drift:.4g} s of the host's: are its times nanoseconds?"
+    return f"one second of the device clock of {stream} lasts {1 + drift:.4g} s: are its times in nanoseconds?"
 
 
 def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegment:
-    """Return the line below all points of a run; `stamps` are the device's and the host's times, (2, n), in order.
+    """Return the line below all points of a run; `stamps` are the device's and the host's times, (2, n) [ns].
 
     Notes
     -----
-    The bound: in each of six windows of equal numbers of points, the ten lowest residuals r1 <= ... <= r10 put the
-    error of a linear clock into [-r1, r10 - 2 r1]; the bound is the largest magnitude in any window, and for the
-    clock's wander the largest step of r1 between neighbouring windows on top [derived]. It is statistical: it assumes
-    that delays sometimes come near their least value in each window. Below sixty points there is none.
+    Error bound: in each of six windows of equal numbers of points, the ten smallest residuals r1 <= ... <= r10 limit
+    the error of a linear clock to [-r1, r10 - 2 r1]. The bound is the largest magnitude in any window plus, for changes
+    of the clock's rate, the largest step of r1 between neighbouring windows [derived]. The bound assumes that some
+    delays in each window are near their least value; fewer than sixty points give no bound.
     """
     device, host = stamps
     middle, first = (int(device[0]) + int(device[-1])) // 2, int(host[0] - device[0])
@@ -73,15 +73,15 @@ def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegm
 
 
 class ClockFit:
-    """Fit of lines to a stream of device and host times; at most 37.5 s of the times are kept in memory.
+    """Fit of lines to the device's and the host's times of a stream; memory holds at most 37.5 s of these times.
 
-    Each line is fitted to 30 s, every 15 s; the last one of a run to what is left, 22.5 to 37.5 s. Within a run the
-    device's times do not go back, and leap by 15 s at most; where they do, a new run of lines begins.
+    Every 15 s, a line is fitted to 30 s of times; the last line of a run is fitted to the rest, 22.5 to 37.5 s. A new
+    run of lines begins where the device's times go back, or leap ahead by more than 15 s.
 
     Parameters
     ----------
     stretch_ns
-        What one line is fitted to.
+        Length of the stretch to which one line is fitted [ns].
     """
 
     def __init__(self, stretch_ns: int = STRETCH_NS) -> None:
@@ -94,17 +94,17 @@ class ClockFit:
 
     @property
     def breaks(self) -> int:
-        """Number of times that the device's times went back."""
+        """Number of steps back in the device's times."""
         return self._runs.breaks
 
     def add(self, device_ns: IntArray, host_ns: IntArray) -> None:
-        """Add rows: (n,) times of the device and of the host, in order."""
+        """Add the device's and the host's times of the next rows, (n,) [ns] each, in order."""
         run = self._runs.count(device_ns)
         for number in np.unique(run).tolist():
             self._extend(number, np.stack((device_ns, host_ns))[:, run == number])
 
     def segments(self) -> tuple[ClockSegment, ...]:
-        """Return the lines of all rows so far."""
+        """Return the lines fitted to all rows added so far."""
         return (*self._done, *self._last())
 
     def _last(self) -> list[ClockSegment]:
@@ -126,17 +126,17 @@ class ClockFit:
 
 
 class RunCounter:
-    """Counter of the runs of a device's times, which end where the times go back or leap."""
+    """Counter of runs of a device's times; a run ends where the times go back, or leap ahead by more than 15 s."""
 
     def __init__(self) -> None:
         self._last: int | None = None
         self._run = 0
 
         self.breaks = 0
-        """Number of times that the times went back."""
+        """Number of steps back in the times."""
 
     def count(self, device_ns: IntArray) -> IntArray:
-        """Return the number of the run of each of the next rows, (n,), from 0."""
+        """Return, for each of the next rows, the number of its run, (n,), counted from 0."""
         steps = np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
         self.breaks += int(np.count_nonzero(steps < 0))
         run = self._run + np.cumsum((steps < 0) | (steps > LEAP_NS))
@@ -148,8 +148,8 @@ class RunCounter:
 class HostTimes:
     """Conversion of a device's times to the host's clock, block by block, by the lines of `clock`.
 
-    Between the middles of two lines the one goes over into the other linearly, so that times do not jump; they keep
-    their order as long as two neighbouring lines differ by less than the 15 s between their middles.
+    Between the middles of two lines, times are interpolated from one line to the next, so that they do not jump. Times
+    keep their order as long as neighbouring lines differ by less than the 15 s between their middles.
     """
 
     def __init__(self, clock: StreamClock) -> None:
@@ -164,20 +164,20 @@ class HostTimes:
             )
 
     def __call__(self, device_ns: IntArray) -> IntArray:
-        """Return the host's times of the next rows, (n,) [ns].
+        """Return the host's times, (n,) [ns], for the device's times of the next rows.
 
         Raises
         ------
         FormatError
-            If there is no line for some of them.
+            If a run of the times has no line.
         """
         run = self._runs.count(device_ns)
         host = np.empty(len(device_ns), dtype=np.int64)
         for number in np.unique(run).tolist():
             if number not in self._lines:
                 raise FormatError(
-                    f"Run {number} of a device's times has no line that puts it on the host's clock.",
-                    hint="Was the meta, or the device's times, changed by hand?",
+                    f"No fitted line converts run {number} of a device's times to the host's clock.",
+                    hint="Use the original file: its meta or its device times seem to be changed.",
                 )
             here = run == number
             host[here] = _on_lines(device_ns[here], *self._lines[number])
@@ -196,10 +196,10 @@ def _on_lines(device: IntArray, middle: IntArray, offset: IntArray, drift: Float
 
 
 def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Return the edge of the lower convex hull above x = 0, as its value there and its slope; x ascends through 0.
+    """Return the value at x = 0 and the slope of the lower convex hull's edge over x = 0; x ascends through 0.
 
-    A line through a point on either side is turned about one of them down to the lowest point below it, until there is
-    none: a step is one pass over arrays, where a chain would go from point to point.
+    Start with a line through a point on either side of 0; while points lie below it, the lowest of them replaces the
+    point on its side. A step is one pass over arrays, while building the whole hull would go from point to point.
     """
     right_of = int(np.searchsorted(x, 0.0, side="right"))
     if x[0] == x[-1]:
@@ -220,8 +220,8 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
     """Return `meta` with lines fitted for every stream in `blocks` that has a device clock.
 
-    A stream with times of its device has one unless `meta` says that its times are the host's. In virtual time, too:
-    what a device's link and its batches add to a time is added there as well.
+    A stream with ``device_ns`` has a device clock unless `meta` states that its times are the host's; also in virtual
+    time, where a device's link and batches delay samples as well.
     """
     otherwise = StreamClock(source="device")
     fits: dict[str, ClockFit] = {}
@@ -237,7 +237,7 @@ def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
 
 
 def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield `blocks` with times on the host's clock by the lines in `meta`, and times of arrival in ``host_ns``."""
+    """Yield `blocks` with times converted to the host's clock by lines in `meta`; ``host_ns``: times of receipt."""
     times: dict[str, HostTimes] = {}
     for stream, columns in blocks:
         clock = meta.clocks.get(stream)

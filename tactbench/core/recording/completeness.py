@@ -1,4 +1,4 @@
-"""Check whether a recording of devices holds all that its scene should give."""
+"""Check of a recording from devices for missing data: silent streams, frozen readings, lost rows."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from tactbench.core.spec.rig_file import Allowed
 from tactbench.core.spec.sensor import StreamSpec
 
 INCOMPLETE = "incomplete: "
-"""Beginning of `excluded` in the meta of an incomplete recording."""
+"""Beginning of the text in the meta's field `excluded` of an incomplete recording."""
 MOVED = 0.2
-"""Share of the range of the force: a sensor is frozen if its readings stand still while the force changes by more
+"""Share of the force's range: a sensor is frozen if its readings are constant while the force changes by more than it
 (assumed; a force sensor's noise is less, and a sensor that is not pressed need not change)."""
 
 
 @dataclass
 class _Events:
-    """Events of a stream, of which only the long pauses between them are kept; times are nanoseconds."""
+    """Counter of a stream's events, with the pauses between events that are longer than allowed [ns]."""
 
     allowed_ns: float
     count: int = 0
     last_ns: int | None = None
     pauses: list[tuple[int, int]] = field(default_factory=list)
-    """Beginning and end of each pause that is longer than is allowed."""
+    """Beginning and end [ns] of each pause longer than `allowed_ns`."""
 
     def add(self, t_ns: IntArray, until_ns: IntArray, start_ns: int) -> None:
-        """Add events, and the times until which nothing had happened; the first pause begins at `start_ns`."""
+        """Add events at `t_ns` and the ends `until_ns` of the pauses before them; the first begins at `start_ns`."""
         self.last_ns = start_ns if self.last_ns is None else self.last_ns
         since_ns = np.concatenate(([self.last_ns], t_ns[:-1]))[: len(t_ns)]
         long = until_ns - since_ns > self.allowed_ns
@@ -41,18 +41,18 @@ class _Events:
 
 
 class Completeness:
-    """Search for silence, stillness and lost rows in the blocks of a recording.
+    """Search for silent streams, frozen readings and lost rows in the blocks of a recording.
 
-    The force sensor is frozen where it stands still for longer than is allowed and most of its other rows differ from
-    the one before; or if it never changes while the sensor does. One with a coarse display, which repeats rows also
-    while it is loaded, may stand still without load.
+    The force sensor is frozen if its readings are constant for longer than allowed although most of its other rows
+    differ from the row before, or if they never change while the tactile sensor's readings do. A force sensor with a
+    coarse display, which repeats readings also under load, may be constant without load.
 
     Parameters
     ----------
     allowed
-        What may be missing.
+        Limits: longest silence, longest time without a change, and share of lost rows.
     sensor, reference
-        Streams of the sensor and of the force sensor. Silence is looked for in those that have a rate.
+        Streams of the tactile sensor and of the force sensor. Only streams with a stated rate are checked for silence.
     """
 
     def __init__(self, allowed: Allowed, sensor: Sequence[StreamSpec], reference: Sequence[StreamSpec]) -> None:
@@ -73,7 +73,7 @@ class Completeness:
         self._force: list[tuple[int, float]] = []
 
     def add(self, block: Block) -> None:
-        """Add a block; one without times is ignored."""
+        """Add a block of samples; a block without times is ignored."""
         stream, t_ns = block.stream, block.t_ns
         if stream not in self._rows or t_ns is None or not len(t_ns):
             return
@@ -98,11 +98,11 @@ class Completeness:
 
     @property
     def seconds(self) -> float:
-        """Time from the first row to the last by the devices' clocks [s]."""
+        """Time between the first and the last row of all streams, by their time stamps [s]."""
         return 1e-9 * (self._end_ns - (self._begin_ns or 0))
 
     def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:
-        """Return a sentence for each stream that lacks more than is allowed; `counts` are the rig's, by stream."""
+        """Return sentences about streams that exceed a limit; `counts` are the rig's counts of rows, by stream."""
         return [text for name in self._rows for text in self._of(name, counts.get(name))]
 
     def _of(self, name: str, counts: StreamCounts | None) -> Iterator[str]:
@@ -111,7 +111,7 @@ class Completeness:
         silences = [*rows.pauses, (last_ns, self._end_ns)]
         from_ns, to_ns = max(silences, key=lambda one: one[1] - one[0])
         if name in self._rated and to_ns - from_ns > rows.allowed_ns:
-            yield f"{name}: nothing for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
+            yield f"{name}: silent for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
         seen_ns = max((self._rows[one].last_ns or 0 for one in self._rows if self._changes[one] is changes), default=0)
         for from_ns, to_ns in [*changes.pauses, (seen_ns if changes.last_ns is None else changes.last_ns, seen_ns)]:
             if to_ns - from_ns > changes.allowed_ns and self._frozen(name, from_ns, to_ns):
@@ -123,7 +123,7 @@ class Completeness:
                 yield f"{name}: {lost} of {due} rows lost"
 
     def _frozen(self, name: str, from_ns: int, to_ns: int) -> bool:
-        """Return whether a sensor did not change while the force did, or a force sensor although it mostly does."""
+        """Return True if a sensor is constant while the force changes, or a usually changing force sensor is."""
         if name not in self._reference:
             every = [value for _, value in self._force]
             within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]

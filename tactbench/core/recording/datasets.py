@@ -1,7 +1,7 @@
-"""Public data sets by name, which are fetched, checked and imported once.
+"""Public data sets, found by name; each is downloaded, checked and imported once.
 
-A data set is a mapping with a `source`. Mappings lie in the folder `datasets` of tactbench's own package and of every
-package that brings a plugin, so that a plugin brings data sets as files; a path names one that lies anywhere.
+A data set is a mapping file with the key `source`. Mapping files lie in the folder `datasets` of tactbench's package
+and of every package with a plugin, so that a plugin can add data sets as files; a path names a mapping file elsewhere.
 """
 
 from __future__ import annotations
@@ -33,69 +33,69 @@ from tactbench.core.recording.mapping.model import DataSource, Mapping
 from tactbench.core.spec.yaml_file import load_yaml
 
 CACHE = "TACTBENCH_CACHE"
-"""Environment variable with the folder of data sets, in place of the user's folder for caches."""
+"""Environment variable that names the folder for downloaded data sets; unset: the user's folder for caches."""
 FOLDER = "datasets"
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """A public data set: a mapping file with a source, known by its name.
+    """A public data set: a mapping file that states the source of its files, found by the file's name.
 
     Parameters
     ----------
     path
-        The mapping file; the data set has its name.
+        Path of the mapping file, whose name without ending is the data set's name.
     """
 
     path: Path
 
     @property
     def name(self) -> str:
-        """Name of the data set."""
+        """Name of the data set: the mapping file's name without its ending."""
         return self.path.stem
 
     @cached_property
     def mapping(self) -> Mapping:
-        """The mapping of the file; raises ConfigError if the file is wrong."""
+        """Content of the mapping file; raises ConfigError if the file is not valid."""
         return load_yaml(self.path, Mapping)
 
     @property
     def source(self) -> DataSource:
-        """Address and digests of the files; raises ConfigError if the mapping states none."""
+        """Address and SHA-256 of the data set's files; raises ConfigError if the mapping file has no `source`."""
         if self.mapping.source is None:
             raise ConfigError(
-                str(self.path), None, "It states no source, so that it is no data set.",
-                hint=f"Add `source`, or import it: tactbench import {self.path}.",
+                str(self.path), None, "It has no key `source`, so that it describes no data set.",
+                hint=f"Add `source`, or import files that you have: tactbench import {self.path}.",
             )  # fmt: skip
         return self.mapping.source
 
     @property
     def files(self) -> Path:
-        """Folder in which the files are kept."""
+        """Folder of the data set's downloaded files."""
         return cache() / self.name / "files"
 
     @property
     def imported(self) -> Path:
-        """Folder of the recordings, another one whenever the mapping or the format of recordings changes."""
+        """Folder of the imported recordings, a new one after a change of the mapping file or of the file format."""
         stated = hashlib.sha256(self.path.read_bytes()).hexdigest()[:12]
         return cache() / self.name / f"recordings-{VERSION}-{stated}"
 
     def recordings(self, root: Path | None = None, progress: Progress | None = None) -> Path:
-        """Return the folder of the recordings, after fetching, checking and importing what is missing.
+        """Return the folder of the recordings, after downloading, checking and importing missing files.
 
         Parameters
         ----------
         root
-            A folder that holds a copy, or whose sub-folder does. What is not there is fetched.
+            Folder with a copy of the files, directly or in a sub-folder; without a copy, the files are downloaded.
         progress
-            Receives every file that is there, and every file that is imported.
+            Receives a step for every file once it is present, and for every file imported.
 
         Raises
         ------
         MissingRecordingError
-            If there is no `root`, a file cannot be had, or its SHA-256 is another than the data set states.
+            If the folder `root` does not exist, or a file cannot be fetched or has another SHA-256 than stated.
         NotApplicable
-            If the files lie at no public address and no copy is named.
+            If the files have no public address, and `root` has no copy.
         MappingError, UnwritableError
             As :func:`~tactbench.core.recording.mapping.importing.import_tables` raises them.
         """
@@ -122,28 +122,28 @@ class DataSet:
             origin = address + name if copy is None else str(copy / name)
             if copy is None and not address and not (self.files / name).is_file():
                 raise NotApplicable(
-                    f"{self.name}: {name} lies at no public address{f', nor in {root}' if root else ''}.",
-                    hint=f"Name a folder that holds it as `root` (--root DIR), or put it into {self.files}.",
+                    f"{self.name}: {name} has no public address{f' and is not in {root}' if root else ''}.",
+                    hint=f"Name a folder with the file as `root` (--root DIR), or put the file into {self.files}.",
                 )
             try:
                 there.fetch(name, downloader=None if copy is None else partial(_copy_file, copy / name))
             except ValueError as error:  # pooch's word for a digest that differs
                 raise MissingRecordingError(
                     f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
-                    hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
+                    hint="The file is not kept. Import another version of it with `tactbench import MAPPING`.",
                 ) from error
             except OSError as error:
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
-                    f"{self.name}: {origin} could not be fetched{missed}: {error}. Its files belong into {self.files}.",
-                    hint="Put them there by hand, or name a folder that holds a copy as `root` (--root DIR). "
-                    "What was fetched before is kept.",
+                    f"{self.name}: {origin} could not be fetched{missed}: {error}. The files belong in {self.files}.",
+                    hint="Put the files there by hand, or name a folder with a copy as `root` (--root DIR). "
+                    "Files fetched before are kept.",
                 ) from error
             progress.advance(name)
 
 
 def cache() -> Path:
-    """Return the folder in which data sets are kept."""
+    """Return the folder for downloaded data sets."""
     if CACHE in os.environ:
         return Path(os.environ[CACHE])
     import pooch
@@ -152,14 +152,14 @@ def cache() -> Path:
 
 
 def datasets() -> dict[str, DataSet]:
-    """Return the data sets of all installed packages by name; a mapping without a source is none.
+    """Return the data sets of all installed packages, by name; mapping files without `source` are left out.
 
-    One whose file is wrong is among them, and raises ConfigError where its mapping is looked at.
+    A data set with an invalid mapping file is included, and raises ConfigError when its mapping is read.
 
     Raises
     ------
     DuplicateNameError
-        If two packages have a data set of one name.
+        If two packages have data sets of the same name.
     """
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():
@@ -175,7 +175,7 @@ def datasets() -> dict[str, DataSet]:
 
 
 def dataset_called(given: str) -> DataSet:
-    """Return the data set of that name, or the one in the mapping file `given`; raises UnknownNameError."""
+    """Return the data set named `given`, or described by the mapping file at that path; raises UnknownNameError."""
     path = mapping_called(given)
     if path is None:
         raise UnknownNameError("data set", given, datasets())
@@ -183,7 +183,7 @@ def dataset_called(given: str) -> DataSet:
 
 
 def mapping_called(given: str) -> Path | None:
-    """Return the mapping file at a path, or of the data set of that name; None: there is none."""
+    """Return the path of the mapping file at `given`, or of the data set of this name; None for an unknown name."""
     if given.endswith((".yaml", ".yml")):
         return Path(given)
     files = (folder / f"{given}.yaml" for folder in _folders().values())
@@ -191,13 +191,13 @@ def mapping_called(given: str) -> Path | None:
 
 
 def mappings_of(module: str) -> list[Path]:
-    """Return the mapping files in the package of a plugin's module."""
+    """Return the paths of the mapping files in the package to which a plugin's module belongs."""
     folder = _folders().get(module.partition(".")[0])
     return [] if folder is None else sorted(folder.glob("*.yaml"))
 
 
 def _folders() -> dict[str, Path]:
-    """Return the folders of mappings by package, without importing a plugin."""
+    """Return the folder of mapping files of each package, by package name, without importing plugins."""
     own = Path(tactbench.__file__).parent
     in_checkout = own.parent / "examples" / "mappings"
     found = {"tactbench": own / FOLDER if (own / FOLDER).is_dir() else in_checkout}
@@ -209,15 +209,15 @@ def _folders() -> dict[str, Path]:
 
 
 def copy_in(root: Path | None, first: str) -> Path | None:
-    """Return `root` or the sub-folder of it that holds the first file; None if none does."""
+    """Return `root`, or its sub-folder, that contains the file named `first`; None if neither does."""
     if root is None:
         return None
     if not root.is_dir():
-        raise MissingRecordingError(f"There is no folder {root}.", hint="Name the folder of the copy.")
+        raise MissingRecordingError(f"There is no folder {root}.", hint="Name a folder with a copy of the files.")
     places = (root, *sorted(path for path in root.iterdir() if path.is_dir()))
     return next((place for place in places if (place / first).is_file()), None)
 
 
 def _copy_file(path: Path, _url: str, output_file: str, _there: Any) -> None:
-    """Download a file for pooch by copying `path`."""
+    """Copy `path` to `output_file`, as a downloader for pooch."""
     shutil.copyfile(path, output_file)

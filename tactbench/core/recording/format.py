@@ -1,4 +1,4 @@
-"""Names and rules of the file format; ``docs/format.md`` is the specification."""
+"""Names and rules of the recordings' file format; ``docs/format.md`` is its specification."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from tactbench.core.spec.sensor import StreamSpec
 
 FORMAT = "tactbench-recording"
 VERSION = 4
-"""Version of the format that is written; every version from 1 on is read."""
+"""Version of the file format for writing; for reading, all versions from 1 on."""
 PARTIAL = ".partial"
-"""Ending of the journal of a recording that is being made."""
+"""File name ending of a journal, which contains the blocks of an unfinished recording."""
 COMPLETING = ".completing"
-"""Ending of the finished file until it has been read back and is renamed."""
+"""File name ending of a finished recording until it is checked by reading it back, and renamed."""
 
 ROWS, CHANNELS = "row", "channel"
-"""Names of the dimension scales of a stream: of its rows where it has no clock, and of its channels. They are no part
-of the digest."""
+"""Names of a stream's HDF5 dimension scales: for the rows of a stream without a clock, and for the channels. The
+content digest leaves both scales out."""
 CHUNK_ROWS = 1024
 
 SEE = "See docs/format.md."
 
 Array = npt.NDArray[Any]
 Annotations = Mapping[str, Mapping[str, Array]]
-"""Labels of rows by stream and name: (n,) texts or whole numbers."""
+"""Labels of rows, by name of the stream and of the label: (n,) texts or whole numbers."""
 Columns = dict[str, Array]
-"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
+"""Columns of a stream by name: data and quality (n, channels); t_ns [ns], sequence and device_ns [ns], (n,) each."""
 Blocks = Iterable[tuple[str, Columns]]
-"""Stream and columns of each block, in the order of arrival."""
+"""Name of the stream and columns of each block, in the order of receipt."""
 
 
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """Return a context that turns errors of reading damaged bytes into FormatError, which names `path`."""
+    """Return a context manager that raises errors of reading a damaged file as FormatError, which names `path`."""
     try:
         yield
     except FormatError:
@@ -55,30 +55,30 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def piece_rows(channels: int) -> int:
-    """Return the number of rows that are read or compressed at a time: whole chunks of some two million values."""
+    """Return the number of rows to read or compress at a time: 1 to 16 chunks, with some two million values at most."""
     return min(max(2**21 // channels // CHUNK_ROWS, 1), 16) * CHUNK_ROWS
 
 
 def canonical(content: Any) -> str:
-    """Return plain data as canonical JSON; ValueError for NaN and infinity, which JSON does not have."""
+    """Return plain data as canonical JSON (sorted keys, no spaces); raises ValueError for NaN and infinity."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return utf8_json(text)
 
 
 def meta_text(meta: RecordingMeta) -> str:
-    """Return `meta` as canonical JSON."""
+    """Return the description of a recording as canonical JSON."""
     return canonical(meta.model_dump(mode="json"))
 
 
 class ContentDigest:
-    """SHA-256 of the content of a recording, which is the same for every file, machine and library version.
+    """SHA-256 of a recording's content; equal content has an equal digest in every file, machine and library version.
 
     Parameters
     ----------
     text
-        The meta as it stands in the file: a model of a later version, with more fields, must not change the digest.
+        The meta as stored in the file: fields that later versions of the model add must not change the digest.
     version
-        That of the file.
+        Version of the file's format.
     """
 
     def __init__(self, text: str, version: int = VERSION) -> None:
@@ -87,11 +87,11 @@ class ContentDigest:
         content = {name: value for name, value in json.loads(text).items() if name not in left_out}
         self._version = version
         self._columns: dict[tuple[str, str, tuple[int, ...]], tuple[Any, list[int]]] = {}
-        """SHA-256 and number of the rows so far, by name, type and shape of a row."""
+        """SHA-256 and number of the rows added so far, by name, type and shape of a row of the column."""
         self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
     def add(self, name: str, values: Array) -> None:
-        """Add rows of a column; before version 4, whole columns are added in the order of the streams."""
+        """Add rows of a column; for files before version 4, add whole columns, in the order of the streams."""
         if values.dtype.kind == "U":
             kind = "text"
             body: Any = "".join(f"{canonical(text)}\n" for text in values.tolist()).encode()
@@ -108,7 +108,7 @@ class ContentDigest:
         rows[0] += len(values)
 
     def hexdigest(self) -> str:
-        """Return the digest of all rows that were added."""
+        """Return the SHA-256 of the meta and of all rows added, as hexadecimal text."""
         sha = self._sha.copy()
         for (name, kind, rest), (column, (rows,)) in sorted(self._columns.items()):
             sha.update(f"{name} {kind} {(rows, *rest)} {column.hexdigest()}\n".encode())
@@ -116,10 +116,10 @@ class ContentDigest:
 
 
 def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
-    """Return the streams that a recording may hold: those of the sensor and those of the reference."""
+    """Return the specs of all streams that a recording may contain, of sensor and reference, by name."""
     return {stream.name: stream for stream in (*meta.sensor.streams, *meta.reference)}
 
 
 def completing_path(path: Path) -> Path:
-    """Return the path of the finished file until it is renamed, by the path of its journal or of the recording."""
+    """Return the temporary path of a finished file, given the path of its journal or of the recording."""
     return path.with_name(path.name.removesuffix(PARTIAL) + COMPLETING)

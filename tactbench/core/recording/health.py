@@ -1,4 +1,4 @@
-"""Checks of the health of a recording: gaps, missing samples, stuck or equal channels, late clocks."""
+"""Checks of a recording for faults: gaps, missing samples, constant or identical channels, lagging clocks."""
 
 from __future__ import annotations
 
@@ -22,47 +22,47 @@ from tactbench.core.spec.sensor import ChannelSpec
 Severity = Literal["error", "warning", "info"]
 
 GAP = 5.0
-"""A step longer than this many median steps is a gap."""
+"""Length of a time step, in median steps, above which the step is a gap."""
 MOST_LISTED = 6
-"""Most channels that a message names one by one."""
+"""Largest number of channels that a message names one by one."""
 RATE_TOLERANCE = 0.05
-"""Relative difference of the stated and the measured rate above which it is reported."""
+"""Relative difference between stated and measured rate above which the difference is reported."""
 COPY = 1.0 - 1e-8
-"""Correlation above which two columns are the same: rounding in a table leaves 1 - 1e-9, noise of 80 dB 1 - 1e-8."""
+"""Correlation above which two columns are copies: rounding leaves 1 - 1e-9, noise 80 dB below the signal 1 - 1e-8."""
 LAG = 5
-"""Most rows by which a copy comes early or late, through a shift or the delay of a filter; rows without a sample are
-not counted."""
+"""Largest number of rows by which a copy may be early or late, because of a shift or a filter's delay; rows without a
+sample are not counted."""
 FEWEST_VALUES = 200
-"""Fewest distinct values whose common order is no chance: noise of a thousandth of the range swaps some twenty pairs of
-so many, 0.56 n² noise / range of n."""
-MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
-"""Phrase about a copy, for messages."""
+"""Fewest distinct values whose equal order is no chance: noise of a thousandth of the range swaps some twenty pairs
+among 200 values (0.56 n² noise / range among n)."""
+MONOTONE = f"apart from rounding a monotone function of {{}}, at most {LAG} rows early or late"
+"""Phrase in messages about a channel that copies the channel named in the braces."""
 GLANCE = 50
-"""Rows that are compared first, as a rule that holds for all rows holds for some."""
+"""Number of rows compared first, to reject most pairs of columns before all rows are compared."""
 WRONG_UNIT = 50.0
-"""Factor between the stated and the measured rate above which times are probably in a wrong unit."""
+"""Factor between the stated and the measured rate of a stream above which its times are probably in a wrong unit."""
 FINDINGS = "findings"
-"""Key of the provenance under which an import stores its findings."""
+"""Key in a recording's provenance under which an import stores its findings."""
 FIELDS = ("check", "severity", "message", "stream", "channels")
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
-"""Checks that mark no score. Taxels without a touch are constant and alike, and those pressed hard saturate; from
-`dead` on, an evaluation that needs the missing data refuses the recording or reports it itself."""
+"""Checks whose findings are not shown with scores. Untouched taxels are constant and identical, pressed ones saturate;
+from `dead` on, an evaluation that needs the missing data refuses the recording or reports the fault."""
 DATED_NS = 10**18
-"""Times from here on, September 2001, are dates, which in a wrong unit would fall into another millennium."""
+"""Time [ns since 1970: September 2001] from which times count as dates; a wrong unit would give another millennium."""
 SLOWEST_HZ = 1.0
-"""Lowest rate of a tactile sensor: a lower one without a stated rate looks like times in a wrong unit."""
+"""Lowest rate of a tactile sensor: if no rate is stated, a lower measured rate suggests times in a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A fact about a recording that matters for a score from it."""
+    """A fault or fact found in a recording that may affect scores computed from the recording."""
 
     check: str
-    """Short name of the check, fit for a filter: stuck, dead, saturated, duplicated, missing, gaps …"""
+    """Short name of the check, for filters: stuck, dead, saturated, duplicated, missing, gaps …"""
     severity: Severity
     message: str
     stream: str = ""
-    """Name of the stream; empty: the whole recording is concerned."""
+    """Name of the stream; empty for a finding about the whole recording."""
     channels: tuple[str, ...] = ()
 
 
@@ -93,11 +93,11 @@ class _Stream:
         self.contents = [digest.digest() for digest in digests]
 
     def names(self, which: Array) -> tuple[str, ...]:
-        """Return the names of the channels that a mask takes."""
+        """Return the names of the channels for which the mask `which`, (channels,), is True."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
     def between(self, kind: str, first_ns: int, last_ns: int) -> tuple[IntArray, FloatArray]:
-        """Return times (n,) and samples (n, q) of the channels of a kind, without rows in which one has no sample."""
+        """Return times (n,) [ns] and samples (n, q) of a kind of channels, from the rows in which all have a sample."""
         assert self.t_ns is not None  # only streams with times are compared
         rows = slice(*np.searchsorted(self.t_ns, (first_ns, last_ns + 1)))
         values, _, missing = _numbers(self._stream[rows])
@@ -107,23 +107,23 @@ class _Stream:
 
 
 def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED) -> str:
-    """Return names as a phrase: "t4 and t7"; of more than `most` the first half: "E1, E2, E3 … (19 channels)"."""
+    """Return names as a phrase: "t4 and t7"; of more than `most` names only some: "E1, E2, E3 … (19 channels)"."""
     if len(names) > most:
         return f"{', '.join(names[: most // 2])} … ({len(names)} {kind})"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _numbers(block: StreamData) -> tuple[FloatArray, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
-    """Return the samples of a block, their flags, and a mask of those that are missing."""
+    """Return the samples of a block, their quality flags, and the mask of missing samples, (n, channels) each."""
     values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
     flags = np.zeros(values.shape, dtype=np.uint8) if block.quality is None else block.quality
     return values, flags, ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
 
 
 def _ends(spec: ChannelSpec) -> tuple[float, float]:
-    """Return the lowest and the highest reading at which a channel is saturated.
+    """Return the lower and the upper reading at which a channel is saturated; infinite: no saturation.
 
-    A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
+    A temperature or position may equal its stated limit without saturation; limits of raw counts and forces are used.
     """
     low, high = spec.lower, spec.upper
     if spec.unit != "count" and (spec.kind not in ("force", "torque") or low == 0):
@@ -134,13 +134,13 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
 
 
 def examine(recording: Recording) -> list[Finding]:
-    """Return all findings of an open recording, the worst first.
+    """Check an open recording and return all findings, the most severe first.
 
     Returns
     -------
     list of Finding
-        Errors (an evaluation would fail or be wrong), warnings (a score may suffer), infos (a reader should know).
-        Empty: nothing was found.
+        Errors (an evaluation would fail or be wrong), warnings (a score may be worse), infos (facts for the reader).
+        Empty list: no findings.
     """
     found = list(_meta_findings(recording))
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
@@ -152,7 +152,7 @@ def examine(recording: Recording) -> list[Finding]:
             continue
         found.extend(_channels(stream))
         if stream.lost_before:
-            text = f"{name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
+            text = f"{name}: {stream.lost_before} of {stream.rows} rows follow lost rows"
             found.append(Finding("rows-before-lost", "warning", text, name))
         if name in recording.meta.clocks:
             found.extend(_clock_fit(name, recording.meta.clocks[name], stream))
@@ -170,9 +170,9 @@ def examine(recording: Recording) -> list[Finding]:
 
 
 def marking(recording: Recording) -> list[Finding]:
-    """Return the findings that mark a score from an open recording: those of its import, or else of a check now.
+    """Return the findings to show with scores from a recording: findings stored by its import, or else of a check now.
 
-    Where a simulation made it without devices, no clock, cable or table can have failed, and nothing is looked for.
+    A recording simulated without devices is not checked: no clock, cable or table can have failed.
     """
     meta = recording.meta
     if FINDINGS in meta.provenance:
@@ -198,11 +198,11 @@ def _meta_findings(recording: Recording) -> Iterator[Finding]:
 def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
     again = counts.duplicates + counts.late
     open_rows = counts.received - counts.written - counts.dropped - again
-    lost = f"{counts.gaps} rows never came, {counts.dropped} were dropped because writing was behind"
+    lost = f"{counts.gaps} rows were not received, {counts.dropped} were dropped because writing was too slow"
     kinds: tuple[tuple[str, Severity, int, str], ...] = (
         ("lost", "warning", counts.gaps + counts.dropped, lost),
-        ("repeated", "info", again, f"{again} rows came twice or late, and were kept out"),
-        ("unaccounted", "warning", open_rows, f"{open_rows} more rows were received than are accounted for"),
+        ("repeated", "info", again, f"{again} rows were received twice or late, and left out"),
+        ("unaccounted", "warning", open_rows, f"{open_rows} received rows are neither written nor counted"),
     )
     yield from (Finding(check, kind, f"{stream}: {text}", stream) for check, kind, count, text in kinds if count)
 
@@ -225,7 +225,7 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
         yield from finding(
             "missing", "info", stream.missing == count, f"without a sample in {count} of {stream.rows} rows"
         )
-    text = f"in {stream.suspect.sum()} samples with a failed parity, checksum or sequence"
+    text = f"failed parity, checksum or sequence in {stream.suspect.sum()} samples"
     yield from finding("suspect", "warning", stream.suspect > 0, text)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
@@ -242,7 +242,7 @@ def _clock_fit(name: str, clock: StreamClock, stream: _Stream) -> Iterator[Findi
     if wrong:
         yield Finding("clock-rate", "error", wrong[0], name)
     if clock.breaks:
-        text = f"the clock of {name} began again (times: {clock.breaks})"
+        text = f"the device clock of {name} restarted (times: {clock.breaks})"
         yield Finding("clock-lost", "warning", text, name)
 
 
@@ -253,10 +253,10 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     backward, doubled = int((steps < 0).sum()), int((steps == 0).sum())
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
-        text = f"time runs backwards {backward} times in {stream}, first at row {row}; a full counter: `wraps_at`?"
+        text = f"times of {stream} run backwards at {backward} rows, first at row {row}; a full counter: `wraps_at`?"
         yield Finding("backward", "error", text, stream)
     if doubled:
-        text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the one before"
+        text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the stamp before"
         yield Finding("repeated-time", "warning", text, stream)
     steps.sort()  # in place: there may be tens of millions
     forward = steps[backward + doubled :]
@@ -270,7 +270,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
-    looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
+    looks = ": were ms read as s?" if rate < slow else ": were s read as ms?" if rate > fast else ""
     if data.t_ns[0] > DATED_NS:
         looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
@@ -302,20 +302,20 @@ def _lags(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:
-    """Return whether a column is a monotone function of another, at most `LAG` rows early or late.
+    """Return True if a column is a monotone function of another, at most `LAG` rows early or late.
 
     Parameters
     ----------
     one, other
         (n,) numbers; NaN where there is no sample.
     recording
-        (n,) which recording a row is of: none is compared with a row of another. None: all are of one.
+        (n,) number of each row's recording; only rows of one recording are compared. None: there is one recording.
 
     Notes
     -----
-    A map is monotone where the rank correlation gamma of Goodman and Kruskal (1954) is 1 or -1: no two rows are in the
-    other order. Ties do not count, so that rounding hides nothing; below `FEWEST_VALUES` of either column, the map must
-    be a scale and an offset.
+    A map is monotone if the rank correlation gamma of Goodman and Kruskal (1954) is 1 or -1: no two rows have opposite
+    order. Ties do not count, so that rounding does not hide a copy; if a column has fewer than `FEWEST_VALUES` distinct
+    values, the map must be linear.
     """
     there = np.isfinite(one) & np.isfinite(other)
     one, other = one[there], other[there]

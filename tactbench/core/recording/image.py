@@ -1,4 +1,4 @@
-"""Building and storing of the HDF5 file of a recording, compressed and described for ordinary viewers."""
+"""Creation and storing of a recording's HDF5 file, compressed, with attributes for ordinary HDF5 viewers."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ def store(
     replace: bool = False,
     sync: bool = True,
 ) -> None:
-    """Write a recording beside its place, read it back and rename it to `target`.
+    """Write a recording to the temporary path `aside`, check it by reading it back, and rename it to `target`.
 
-    Of the recording, memory holds the compressed file and some chunks of each stream.
+    Memory holds the compressed file and some chunks of each stream.
 
     Parameters
     ----------
     meta
         Description of the recording, its clock fits included.
     blocks
-        As they came; their times are put on the host's clock here.
+        Blocks in the order of receipt; device times are converted to the host's clock here.
     aside
-        Where the file is written until it has been read back.
+        Temporary path of the file until it has been read back.
     replace
-        Whether `target` may be there already.
+        True: an existing file at `target` is replaced.
     sync
-        Whether to wait for the disk; False for what can be made again.
+        True: wait until the disk has stored the file; False suits recordings that can be made again.
 
     Raises
     ------
     RecordingError
-        If `target` exists and is not to be replaced, what was written reads otherwise, or the disk refuses; `target`
-        is as it was.
+        If `target` exists and `replace` is False, the file read back differs from the data, or the disk refuses to
+        write; `target` stays unchanged.
     """
     try:
         with writable(target):
@@ -68,7 +68,7 @@ def store(
                     written.verify()
             except FormatError as error:
                 raise UnwritableError(
-                    f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
+                    f"The data of {target}, read back, differ from the data written.", hint="Check the disk."
                 ) from error
             if not replace:
                 require_free(target)
@@ -85,13 +85,13 @@ def store(
 
 
 def require_free(path: Path) -> None:
-    """Raise UnwritableError if there is a file already."""
+    """Raise UnwritableError if there is already a file at `path`."""
     if path.exists():
-        raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
+        raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete the file.")
 
 
 def build(meta: RecordingMeta, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
-    """Return an HDF5 file with all blocks, as for `store`. Its digest is of the blocks, before HDF5 has them."""
+    """Return the bytes of an HDF5 file with all blocks and with their digest, computed before HDF5 stores them."""
     return hdf5_image(lambda file: _fill(file, meta, blocks, annotations, complete))
 
 
@@ -118,7 +118,7 @@ def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotatio
 
 
 def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
-    """Yield blocks and add them to the digest, with quality from the first block on that has some."""
+    """Yield blocks and add them to the digest, with quality from the first block of a stream on that has quality."""
     rows: Counter[str] = Counter()
     flagged = set()
     for stream, columns in blocks:
@@ -135,7 +135,7 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
 
 
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield larger blocks, of whole chunks except for the last of a stream, so that each chunk is compressed once."""
+    """Yield larger blocks, of whole chunks except for a stream's last block, so that each chunk is compressed once."""
     waiting: dict[str, list[Columns]] = {}
     rows: Counter[str] = Counter()
     for stream, columns in blocks:
@@ -151,7 +151,7 @@ def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
 
 
 def _joined(blocks: list[Columns]) -> Columns:
-    """Return blocks as one; the rows before the first with quality are good."""
+    """Return several blocks joined to one; rows before the first block with quality get the quality good."""
     if "quality" in blocks[-1]:
         blocks = [{"quality": np.zeros_like(block["data"], dtype=np.uint8)} | block for block in blocks]
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[-1]}
@@ -169,7 +169,7 @@ def _extend(group: Any, columns: Columns) -> None:
 
 
 def _create(group: Any, name: str, values: Array, start: int = 0) -> Any:
-    """Return a new column with `values` from row `start` on; the zeros before late quality mean good samples."""
+    """Return a new column with `values` from row `start` on; rows before are 0, as a quality: good samples."""
     rest = values.shape[1:]
     column = group.create_dataset(
         name, shape=(start + len(values), *rest), maxshape=(None, *rest), dtype=values.dtype, compression="gzip",
@@ -190,7 +190,7 @@ def _annotate(group: Any, label: str, column: Array) -> None:
 
 
 def _describe(group: Any, spec: StreamSpec) -> None:
-    """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
+    """Write the attributes with which ordinary HDF5 viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
     group.attrs.update(NX_class="NXdata", signal="data", **({"axes": ["t_ns", "."]} if "t_ns" in columns else {}))
     for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
@@ -203,7 +203,7 @@ def _describe(group: Any, spec: StreamSpec) -> None:
 def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
     """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
-    Libraries of the netCDF world then read a stream with its coordinates.
+    Libraries for netCDF files can then read a stream with its coordinates.
     """
     import h5py
 

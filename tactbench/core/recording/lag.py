@@ -1,9 +1,9 @@
-"""Estimation of how much later a sensor is stamped than the reference beside it.
+"""Estimation of the lag of a sensor's time stamps behind those of the reference that measures the same force.
 
-A sensor that creeps, relaxes or has hysteresis follows a force in loops too, and a shift takes some of them away. It
-answers every change at once, though: what it adds is a weighted past of the force, or depends on the force's direction.
-So its taxels are explained twice: by a curve over the shifted force, and by that with the past and the direction of the
-shifted force beside it. A lag is what the second explanation needs as well as the first.
+Creep, relaxation and hysteresis also make loops in a plot of taxel over force, and a time shift removes part of them.
+But such a sensor answers each change at once, and adds a weighted past of the force or a term of its direction. So the
+taxels are fitted twice: by a curve over the shifted force, and by this curve with the past and the direction of the
+shifted force. A lag is reported only if both fits need it.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ import numpy as np
 from tactbench.core.samples import FloatArray, IntArray
 
 FINEST_S = 0.01
-"""Smallest step of the common grid [s]; the median step of the slower clock is taken if it is longer."""
+"""Smallest step of the common time grid [s]; a longer median step of the slower stream is taken instead."""
 FEWEST_ROWS = 100
-"""Fewest rows of a stream, and of the grid, in which a lag is looked for."""
+"""Fewest rows of a stream, and of the common grid, for which a lag is estimated."""
 TIME_CONSTANTS_S = (0.05, 0.2, 0.8, 3.2)
-"""Time constants of the past in the second explanation; sums of two resemble those in between to a few percent."""
+"""Time constants of the low-passes in the second fit [s]; sums of two approximate those between to a few percent."""
 DEGREE = 5
-"""Degree of the curve, which must follow the kinks of a sensor that is clipped or answers above a threshold only."""
+"""Degree of the polynomial curve, which must follow the kinks of a sensor with saturation or a threshold."""
 SUSPECTED = 1.3
-"""Factor by which a lag must reduce the squares that the curve leaves."""
+"""Factor by which a lag must reduce the sum of squared residuals of the first fit."""
 NEEDED = 4.0
-"""Factor by which a lag must reduce what the past leaves as well, as its autocovariance at one row, in which white
-noise does not count. Of 5,376 simulated sensors without a lag, most of which creep, relax or have hysteresis, two came
-above it, both under a sine without rests; a lag of 100 ms makes it 5 to 1,000."""
+"""Factor by which a lag must reduce the autocovariance, at one row, of the second fit's residuals, in which white noise
+does not count. Of 5,376 simulated sensors without a lag, most with creep, relaxation or hysteresis, two exceeded it,
+both under a sine without rests; a lag of 100 ms gives 5 to 1,000."""
 FASTEST_DRIFT = 0.05
 """Largest rate at which two clocks drift apart [1]."""
 SIGNIFICANT = 4.0
-"""Standard errors above which a lag is significant."""
+"""Number of standard errors above which a lag is significant."""
 LONGEST_S, MOST_ROWS = 60.0, 2000
-"""Longest recording, in seconds or in rows of the grid, that is examined whole; of a longer one both ends, half as long
-each, are."""
+"""Longest recording, in seconds or in rows of the slower stream, that is examined whole; of longer recordings, two ends
+of half this length are."""
 _BLOCKS = 8
 _ITERATIONS = 6
 
@@ -47,11 +47,11 @@ class Lag:
     middle: tuple[float, float]
     end: tuple[float, float]
     drifts: bool
-    """Whether the lag changes by more than a sample and three standard errors."""
+    """True if the lag changes by more than a sample and four standard errors."""
 
 
 def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int]]:
-    """Return the spans [ns] in which a lag is looked for, within the time that both clocks have, by their place."""
+    """Return the spans [ns] to search for a lag, by place, within the time that both streams cover."""
     first, last = int(max(sensor_ns[0], force_ns[0])), int(min(sensor_ns[-1], force_ns[-1]))
     slower = max(float(times[-1] - times[0]) / (len(times) - 1) for times in (sensor_ns, force_ns))
     longest = int(max(1e9 * LONGEST_S, MOST_ROWS * slower))
@@ -61,26 +61,26 @@ def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int
 
 
 def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray) -> Lag | None:
-    """Return the lag of the leading component of a sensor behind that of a reference.
+    """Return the lag of a sensor's leading component behind that of a reference.
 
     Parameters
     ----------
     sensor_ns, force_ns
-        (n,) and (m,) increasing times [ns], of clocks that are meant to be one.
+        (n,) and (m,) increasing times [ns], meant to be of the same clock.
     sensor, force
         (n, p) and (m, q) samples, all finite.
 
     Returns
     -------
     Lag or None
-        None: there is none beyond a sample and three standard errors, or what was recorded cannot tell: a slow ramp, a
-        sine without rests.
+        None: no lag is above a sample and four standard errors, or the force allows no estimate: a slow ramp, a sine
+        without rests.
 
     Notes
     -----
     Separable least squares (Golub and Pereyra 1973) in the lag and its linear change, by Gauss-Newton steps from where
-    the cross-correlation is best. The error is the jackknife's over eight stretches of time, and by how far the two
-    explanations differ.
+    the cross-correlation is best. The error combines the jackknife over eight stretches of time and the difference
+    between the two fits.
     """
     if min(len(sensor), len(force)) < FEWEST_ROWS or not sensor.shape[1] or not force.shape[1]:
         return None
@@ -128,7 +128,7 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
 
 
 class _Explained:
-    """Least-squares explanation of a shifted `x` by columns, in the rows that every shift in a range leaves."""
+    """Least-squares fit of columns to `x` shifted by a lag, over the rows that exist for every lag in a range."""
 
     def __init__(self, x: FloatArray, columns: FloatArray, lowest: int, highest: int) -> None:
         self._rows = np.arange(-lowest, len(x) - highest)
@@ -172,7 +172,7 @@ def _neighbours(left: FloatArray) -> float:
 
 
 def _leading(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
-    """Return the leading component, averaged between edges, with mean 0 and variance 1."""
+    """Return the leading principal component, averaged between grid `edges`, with mean 0 and variance 1."""
     centred = values - values.mean(axis=0)
     component = centred @ np.linalg.eigh(centred.T @ centred)[1][:, -1]
     area = np.concatenate([[0.0], np.cumsum((component[1:] + component[:-1]) / 2 * np.diff(times))])
@@ -186,7 +186,7 @@ def _standard(values: FloatArray) -> FloatArray:
 
 
 def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
-    """Return the lags and drifts [rows] that the search starts from, of the whole and of both halves."""
+    """Return the lags and drifts [rows] at which the search starts, from the whole recording and from both halves."""
     lag, gain = _correlated(x, f, len(x) // 5)
     starts = [(float(lag), 0.0)] if gain > SUSPECTED else []
     if starts or len(x) > 10 * FEWEST_ROWS:
@@ -200,9 +200,9 @@ def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
 
 
 def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
-    """Return the shortest of the best lags up to `most` rows, and the factor by which it reduces the squares.
+    """Return the shortest of the best lags up to `most` rows, and the factor by which it reduces squared residuals.
 
-    Of a force that repeats itself several lags are as good.
+    If the force repeats itself, several lags are equally good.
     """
     curve = _curve(f)[:, 2:]
     base = np.linalg.qr(curve - curve.mean(axis=0))[0]
@@ -231,7 +231,7 @@ def _curve(f: FloatArray) -> FloatArray:
 
 
 def _past(f: FloatArray, step: float) -> FloatArray:
-    """Return columns (n, …): the force under low-passes, traces of forces before the first row, and its direction."""
+    """Return columns (n, …): the low-passed force, decays of forces before the first row, and the force's direction."""
     n, times = len(f), np.arange(len(f)) * step
     spectrum = np.fft.rfft(f - f[0], 2 * n)
     columns = []

@@ -1,15 +1,15 @@
-"""Journal of a recording that is being made, which can be read at every moment, also after ``kill -9``; its rescue.
+"""Journal of an unfinished recording, readable at every moment, also after ``kill -9``; its conversion to a recording.
 
-An HDF5 file cannot be that: between two flushes its chunks and their index disagree, and a process killed there leaves
-a file of which the last chunks, or all of it, cannot be read.
-A journal is the line ``tactbench-partial 2`` and frames, one after the other. Whatever happens, the frames before hold.
+An HDF5 file would not do: between two flushes its chunks and their index disagree, and a process killed then leaves a
+file whose last chunks, or all chunks, cannot be read.
+A journal is the line ``tactbench-partial 2`` followed by frames. Whatever happens, complete frames stay readable.
 A frame is a head of 16 bytes, little-endian (uint32 length of the JSON, uint64 length of the body, uint32 CRC-32 of
-both), the JSON, the body. The first frame's JSON is the meta, without body; every other one is
+both), the JSON, the body. The first frame's JSON is the meta, without body; every later frame is
 
 - ``[stream, [[column, type, shape], ...]]``: a block, whose body is its columns, little-endian, in that order;
 - ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body.
 
-``tactbench-partial 1``, which has only blocks, without ``device_ns``, is read.
+Journals of ``tactbench-partial 1``, with blocks only and without ``device_ns``, can be read, too.
 """
 
 from __future__ import annotations
@@ -53,19 +53,19 @@ REMARK = "Rescued: the recording broke off and is not whole."
 
 
 class Partial:
-    """The journal of one attempt to make a recording, for writing; no other attempt has the same file.
+    """Writer of the journal of one attempt to make a recording; each attempt has its own file.
 
     Parameters
     ----------
     path
-        Where the recording is to lie.
+        Path of the finished recording.
     text
-        The meta as it is known now.
+        The meta known so far, as canonical JSON.
     """
 
     def __init__(self, path: Path, text: str) -> None:
         self.rows: dict[str, int] = {}
-        """Number of rows of each stream that has had a block."""
+        """Number of rows written so far, by stream, for streams with at least one block."""
         self._end = 0
         for attempt in itertools.count(1):  # x.h5.partial, x.h5.2.partial and so on
             self.path = path.with_name(f"{path.name}{'' if attempt == 1 else f'.{attempt}'}{PARTIAL}")
@@ -85,7 +85,7 @@ class Partial:
             raise
 
     def append(self, stream: str, columns: Mapping[str, Array]) -> None:
-        """Add a block; once this returns, only a crash of the operating system can lose it."""
+        """Write a block to the file; after the return, only a crash of the operating system can lose the block."""
         plain = {name: np.ascontiguousarray(values, values.dtype.newbyteorder("<")) for name, values in columns.items()}
         shapes = [[name, values.dtype.str, list(values.shape)] for name, values in plain.items()]
         head = json.dumps([stream, shapes]).encode()
@@ -93,11 +93,11 @@ class Partial:
         self.rows[stream] = self.rows.get(stream, 0) + len(columns["data"])
 
     def revise(self, changes: Mapping[str, Any]) -> None:
-        """Add fields that replace those of the meta, as plain data; raises ValueError for NaN and infinity."""
+        """Write new values of some of the meta's fields, as plain data; raises ValueError for NaN and infinity."""
         self._write(_frame(json.dumps({"meta": changes}, allow_nan=False).encode(), b""))
 
     def close(self) -> None:
-        """Close the journal and leave it where it is."""
+        """Close the journal's file without removing it."""
         os.close(self._file)
 
     def _write(self, frame: bytes) -> None:
@@ -115,20 +115,20 @@ class Partial:
 
 @dataclass(frozen=True)
 class _Journal:
-    """Content of a journal when it was read; it may have grown since."""
+    """Content of a journal at the time of reading; the file may have grown since."""
 
     path: Path
     meta: RecordingMeta
-    """The latest meta."""
+    """The meta with all changes written so far."""
     end: int
-    """Length of the whole frames [bytes]."""
+    """Length of the file up to the end of its last complete frame [bytes]."""
 
     def blocks(self) -> Blocks:
-        """Yield the stream and the columns of each block."""
+        """Yield the name of the stream and the columns of each block."""
         return read_blocks(self.path, self.end)
 
     def fitted(self, **changes: Any) -> RecordingMeta:
-        """Return the meta with changes, and with clock fits and counts of rows from the blocks."""
+        """Return the meta with `changes` applied, and with clock fits and row counts computed from the blocks."""
         rows: Counter[str] = Counter()
 
         def counted() -> Blocks:
@@ -142,16 +142,16 @@ class _Journal:
 
 
 def salvage(path: Path) -> Recording:
-    """Open an unfinished recording (``….partial``), in which every block can be read that had been written.
+    """Open an unfinished recording (``….partial``) for reading, with every block written so far.
 
-    It may still be growing: the recording has the blocks of this moment.
+    The file may still grow: the opened recording has the blocks present at this moment.
 
     Raises
     ------
     MissingRecordingError
         If there is no such file.
     FormatError
-        If it is not an unfinished recording.
+        If the file is not an unfinished recording.
     """
     import h5py
 
@@ -164,16 +164,16 @@ def salvage(path: Path) -> Recording:
 
 
 def rescue(path: Path, target: Path) -> None:
-    """Convert an unfinished recording into a finished one at `target`, excluded from evaluations since it broke off.
+    """Convert an unfinished recording into a finished one at `target`, excluded from evaluations as interrupted.
 
-    The unfinished one stays where it is.
+    The file of the unfinished recording is kept.
 
     Raises
     ------
     MissingRecordingError
         If there is no such file.
     FormatError
-        If it is not an unfinished recording.
+        If the file is not an unfinished recording.
     RecordingError
         If `target` exists, or cannot be written.
     """
@@ -185,15 +185,15 @@ def rescue(path: Path, target: Path) -> None:
 
 
 def _read(path: Path) -> _Journal:
-    """Return the content of a journal, as far as its frames are whole; raises as :func:`salvage`."""
+    """Return the content of a journal up to its last complete frame; raises the errors of :func:`salvage`."""
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     frames = _frames(path, path.stat().st_size)
     text, _, end = next(frames, (b"", b"", 0))
     if not end:
         raise FormatError(
-            f"{path} is not an unfinished recording, or broke off at once.",
-            hint="A finished one is read without `--salvage`.",
+            f"{path} is not an unfinished recording, or has no complete frame.",
+            hint="Read a finished recording without `--salvage`.",
         )
     with readable(path):
         content = json.loads(text)
@@ -205,7 +205,7 @@ def _read(path: Path) -> _Journal:
 
 
 def read_blocks(path: Path, end: int | None = None) -> Blocks:
-    """Yield the blocks in the first `end` bytes of a journal; raises FormatError for one that makes no sense."""
+    """Yield the blocks in the first `end` bytes of a journal; raises FormatError for an invalid block."""
     frames = _frames(path, path.stat().st_size if end is None else end)
     next(frames, None)
     for head, body, _ in frames:
@@ -220,7 +220,7 @@ def _frame(head: bytes, body: bytes) -> bytes:
 
 
 def _frames(path: Path, end: int) -> Iterator[tuple[bytes, bytes, int]]:
-    """Yield the head, the body and the end of every frame, up to the first that is not whole."""
+    """Yield the head, the body and the end [bytes] of every frame before the first incomplete or damaged frame."""
     with path.open("rb") as file:
         if file.read(len(MAGIC)) not in _READ:
             return

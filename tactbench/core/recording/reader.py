@@ -1,4 +1,4 @@
-"""Lazy reading of recordings from their files."""
+"""Reading of recordings from their files, as far as their data are needed."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ _COLUMNS = {
     "data": ("iuf", 2), "t_ns": ("i", 1), "quality": ("u", 2), "sequence": ("i", 1), "device_ns": ("i", 1),
     "host_ns": ("i", 1),
 }  # fmt: skip
-"""Columns of a stream, with the kinds of NumPy types and the number of dimensions that they may have."""
+"""Columns of a stream by name, with their permitted kinds of NumPy types and their number of dimensions."""
 
 
 class LazyStream:
-    """A stream of an open recording, of which only slices are read."""
+    """A stream of an open recording; a slice of it reads only the rows of the slice."""
 
     def __init__(self, path: Path, spec: StreamSpec, columns: dict[str, Any]) -> None:
         self.spec = spec
         self._path = path
         self._columns = columns
         self.annotations = tuple(name.removeprefix(_NOTE) for name in columns if name.startswith(_NOTE))
-        """Names of the labels of rows."""
+        """Names of the labels that every row of the stream has."""
 
     def __len__(self) -> int:
         return int(self._columns["data"].shape[0])
 
     def __getitem__(self, rows: slice) -> StreamData:
-        """Return the rows of a slice, reading no others; raises FormatError if they are damaged."""
+        """Read and return only the rows of a slice; raises FormatError if the file is damaged there."""
         read: dict[str, Any] = {
             "t_ns": None,
             "quality": None,
@@ -49,15 +49,15 @@ class LazyStream:
         return StreamData(spec=self.spec, annotations=notes, **read)
 
     def blocks(self) -> Iterator[StreamData]:
-        """Yield the whole stream in order, some 16 MiB at a time."""
+        """Yield the whole stream in consecutive blocks of rows, some 16 MiB each."""
         return (self[rows] for rows in self._pieces())
 
     def times(self) -> IntArray | None:
-        """Return the times, (n,) nanoseconds; None where there is no clock."""
+        """Return the times of all rows, (n,) [ns]; None if the recording has no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
     def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
-        """Add every column to a digest under its path in the file, `whole` or in pieces."""
+        """Add every column to a content digest under its path in the file, `whole` or in blocks of rows."""
         for name in sorted(self._columns):
             for rows in [slice(None)] if whole or not len(self) else self._pieces():
                 digest.add(f"/{self.spec.name}/{name}", self._read(name, rows))
@@ -80,18 +80,18 @@ class LazyStream:
 
 
 class Recording:
-    """An open recording, which is a context manager.
+    """An open recording; as a context manager, it closes its file.
 
     Attributes
     ----------
     path
-        The file.
+        Path of the file.
     meta
         Description of the recording.
     complete
-        False for what a crash left behind.
+        False for an unfinished recording, as a crash leaves it.
     version
-        That of the file's format.
+        Version of the file's format.
     stream_names
         Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
@@ -115,7 +115,7 @@ class Recording:
         self._file.close()
 
     def stream(self, name: str) -> LazyStream:
-        """Return a stream to slice.
+        """Return the stream `name`, of which slices can be read.
 
         Raises
         ------
@@ -125,7 +125,7 @@ class Recording:
         if name not in self.stream_names:
             raise FormatError(
                 f"{self.path} has no stream {name!r}; it has {', '.join(self.stream_names) or 'none'}.",
-                hint="See what is in it with `tactbench inspect`.",
+                hint="List its streams with `tactbench inspect`.",
             )
         if name not in self._opened:
             with layout.readable(self.path):
@@ -134,29 +134,29 @@ class Recording:
         return self._opened[name]
 
     def read(self, name: str) -> StreamData:
-        """Return a whole stream; raises FormatError if there is none, or if it is damaged."""
+        """Read a whole stream; raises FormatError if the recording has no such stream, or the file is damaged."""
         return self.stream(name)[:]
 
     def content_digest(self) -> str:
-        """Return the content digest, computed from the data now."""
+        """Return the content digest, computed anew from the data in the file."""
         digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
             self.stream(name).add_to(digest, whole=self.version < 4)
         return digest.hexdigest()
 
     def verify(self) -> str:
-        """Return the content digest; raises FormatError if it differs from the one that was written with the data."""
+        """Return the computed content digest; raises FormatError if it differs from the digest stored in the file."""
         digest = self.content_digest()
         if digest != self._file.attrs.get("content_sha256", ""):
             raise FormatError(
-                f"{self.path} does not hold what was written: its content digest differs.",
-                hint="The file was changed or damaged afterwards; get it again from its source, or record it again.",
+                f"{self.path} was changed or damaged: its content digest differs from the stored one.",
+                hint="Get the file again from its source, or record it again.",
             )
         return digest
 
 
 class UnwrittenRecording(Recording):
-    """A recording in memory that is examined before it is written, without labels of rows."""
+    """A recording in memory, without labels of rows, for checks before it is written."""
 
     def __init__(self, meta: RecordingMeta, streams: Iterable[StreamData]) -> None:
         self.path, self.meta = Path(meta.name), meta
@@ -177,7 +177,7 @@ def open_recording(path: Path) -> Recording:
     MissingRecordingError
         If there is no such file.
     FormatError
-        If it is not a recording, is damaged or unfinished, or was written by a newer tactbench.
+        If the file is not a recording, is damaged or unfinished, or was written by a newer tactbench.
     """
     import h5py
 
@@ -192,7 +192,7 @@ def open_recording(path: Path) -> Recording:
     except (OSError, RuntimeError, ValueError) as error:
         raise FormatError(
             f"{path} cannot be read, is not an HDF5 file, or was cut short: {error}.",
-            hint="Check its permissions, or get it again; `….partial` files are what a crash left behind.",
+            hint="Check its permissions, or get it again; read `….partial` files, left by a crash, with `--salvage`.",
         ) from error
     try:
         with layout.readable(path):
@@ -203,25 +203,25 @@ def open_recording(path: Path) -> Recording:
 
 
 def read_meta(path: Path) -> RecordingMeta:
-    """Return the meta of a recording."""
+    """Return the meta, the description, of the recording in a file."""
     with open_recording(path) as recording:
         return recording.meta
 
 
 def content_digest(path: Path) -> str:
-    """Return the content digest of a recording; raises FormatError if its data have changed since."""
+    """Return the content digest of a recording; raises FormatError if it differs from the digest stored in the file."""
     with open_recording(path) as recording:
         return recording.verify()
 
 
 def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> dict[str, Any]:
-    """Return the datasets of a stream by their path in its group; raises FormatError if they contradict the meta."""
+    """Return a stream's HDF5 datasets by path in its group; raises FormatError if the datasets contradict the meta."""
     import h5py
 
     columns = {name: group[name] for name in _COLUMNS if name in group}
     columns |= {_NOTE + name: item for name, item in group.get("annotations", {}).items()}
     clock = recording.meta.clock
-    wrong = [] if ("t_ns" in columns) != (clock == "none") else [f"clock {clock!r} beside the columns {[*columns]}"]
+    wrong = [] if ("t_ns" in columns) != (clock == "none") else [f"clock {clock!r}, but the columns {[*columns]}"]
     if "data" not in columns or columns["data"].dtype.newbyteorder("=") != np.dtype(spec.dtype):
         wrong.append(f"no data of type {spec.dtype}")
     for name, item in columns.items():
@@ -229,14 +229,14 @@ def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> 
         kinds, dimensions = _COLUMNS.get(name, ("iu", 1))
         shape = (group["data"].shape[0] if "data" in columns else 0, len(spec.channels))[:dimensions]
         if item.shape != shape or not (text or item.dtype.kind in kinds):
-            wrong.append(f"{name} of {item.dtype} in {item.shape}, where {shape} is expected")
+            wrong.append(f"{name} of {item.dtype} and shape {item.shape}, where {shape} is expected")
     if wrong:
         raise FormatError(f"In {path}, stream {spec.name!r} has {wrong[0]}.", hint=layout.SEE)
     return columns
 
 
 def _envelope(path: Path, file: Any) -> str:
-    """Return the meta of an HDF5 file as text; raises FormatError for a file that is no finished recording."""
+    """Return the meta of an HDF5 file as text; raises FormatError for a file other than a finished recording."""
     if file.attrs.get("format") != layout.FORMAT:
         raise FormatError(
             f"{path} is an HDF5 file, but not a tactbench recording.",
@@ -255,7 +255,7 @@ def _envelope(path: Path, file: Any) -> str:
 
 
 def parse_meta(path: Path, text: str) -> RecordingMeta:
-    """Return the meta in a text; raises FormatError, which names `path`, if it is not valid."""
+    """Return the meta parsed from JSON text; raises FormatError, which names `path`, if the text is not valid."""
     try:
         return RecordingMeta.model_validate(json.loads(text))
     except (ValueError, UsageError) as error:

@@ -1,4 +1,4 @@
-"""Writing of recordings, of which a crash loses the last block at most."""
+"""Writing of recordings so that a crash loses at most the last block."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from tactbench.core.spec.sensor import StreamSpec
 
 
 class RecordingWriter:
-    """Writer of one recording, which is a context manager.
+    """Writer of one recording, and context manager.
 
-    While it is open, a journal ``<path>.partial`` (or ``<path>.2.partial`` where that is taken, and so on) holds, after
-    every block, all blocks so far. Leaving the context completes the recording: times of devices are put on the host's
-    clock, the file is written beside its place, read back, and renamed to `path`; only then is the journal removed.
-    When the context is left by an exception, or the recording cannot be completed, the journal of devices' recordings
-    stays, and the error names the command that makes a recording of it.
+    While the writer is open, a journal ``<path>.partial`` (if this file exists, ``<path>.2.partial`` and so on)
+    contains all blocks so far. Leaving the context completes the recording: device times are converted to the host's
+    clock, the file is written under a temporary name, read back, and renamed to `path`; only then is the journal
+    removed. After an exception, or if the recording cannot be completed, the journal of a recording from devices is
+    kept, and the error names the command that converts it to a recording.
 
     Parameters
     ----------
     path
-        Where the finished recording shall lie.
+        Path of the finished recording.
     meta
         Description of the recording; :meth:`revise` changes it until the end.
     replace
-        Whether a file that is there is replaced, at the end and not before.
+        True: an existing file is replaced, but only when the new recording is complete.
 
     Raises
     ------
     RecordingError
-        If there is a file and it is not to be replaced, or the disk refuses.
+        If the file exists and `replace` is False, or the disk refuses to write.
     """
 
     def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
@@ -75,21 +75,21 @@ class RecordingWriter:
 
     @property
     def _unique(self) -> bool:
-        """True if the recording cannot be made again, or is of emulated devices, which stand for real ones."""
+        """True if the recording cannot be made again, or is of emulated devices, which are treated like real ones."""
         return not self.meta.simulated or self.meta.emulation is not None
 
     @property
     def rows(self) -> Mapping[str, int]:
-        """Number of rows of each stream that has had a block."""
+        """Number of rows written so far, by stream, for streams with at least one block."""
         return self._partial.rows
 
     def complete(self) -> None:
-        """Complete the recording, as leaving the context does; after an exception, before it is left.
+        """Complete the recording now, as leaving the context does; for use inside the context after an exception.
 
         Raises
         ------
         RecordingError
-            If the disk refuses it; the journal then stays, as after a crash.
+            If the disk refuses to write; the journal is then kept, as after a crash.
         """
         journal = self._partial
         if any(timed for _, timed in self._optional.values()):
@@ -100,18 +100,18 @@ class RecordingWriter:
         self._complete = True
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
-        """Yield the blocks of the journal; raises RecordingError if rows of it are lost."""
+        """Yield the blocks of the journal; raises RecordingError if the journal lacks rows that were written to it."""
         left = dict(journal.rows)
         for stream, columns in read_blocks(journal.path):
             left[stream] -= len(columns["data"])
             yield stream, columns
         if any(count > 0 for count in left.values()):
             raise RecordingError(
-                f"The recording {self.path} lost rows while it was made: {left}.", hint="Did the disk fail?"
+                f"The journal of {self.path} has lost rows, by stream: {left}.", hint="Check the disk."
             )
 
     def _leave(self, error: BaseException | None) -> None:
-        """Close the journal, and remove it unless it holds rows that are nowhere else."""
+        """Close the journal, and remove it unless it has the only copy of rows that cannot be recorded again."""
         journal = self._partial
         journal.close()
         if not self._complete and any(journal.rows.values()) and self._unique:
@@ -130,7 +130,7 @@ class RecordingWriter:
         Raises
         ------
         RecordingError
-            If a field is unknown or a value does not fit it, or the disk refuses it.
+            If a field is unknown, a value does not fit its field, or the disk refuses to write.
         """
         try:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
@@ -142,23 +142,23 @@ class RecordingWriter:
             self._partial.revise(self.meta.model_dump(mode="json", include=set(changes)))
 
     def append(self, block: Block) -> None:
-        """Add `block` to its stream and flush it.
+        """Add `block` to its stream, and write it to the journal at once.
 
         Raises
         ------
         RigError
-            If the block does not fit its stream: unknown name, wrong number of channels or of times, a clock where
-            there is none, readings that do not fit the stored type, a force of the reference that is NaN and not marked
-            as missing.
+            If the block does not fit its stream: unknown name, wrong number of channels or of times, times in a
+            recording without a clock, readings that do not fit the stored type, a force of the reference that is NaN
+            and not marked missing.
         RecordingError
-            If the disk refuses it.
+            If the disk refuses to write.
         """
         columns = stored_columns(block, self.meta, self._specs)
         has = (block.sequence is not None, block.device_ns is not None)
         if self._optional.setdefault(block.stream, has) != has:
             raise RigError(
                 f"Some blocks of stream {block.stream!r} have sequence numbers or device times and some have none.",
-                hint="Give them with all blocks of a stream, or with none.",
+                hint="Give either of them with all blocks of a stream, or with no block.",
             )
         with writable(self.path):
             self._partial.append(block.stream, columns)
@@ -167,12 +167,12 @@ class RecordingWriter:
 def write_recording(
     path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
 ) -> None:
-    """Write a recording whose blocks are all there, and can be had again: no journal is kept of it.
+    """Write a recording from blocks in memory that can be made again, so that no journal is needed.
 
     Parameters
     ----------
     path
-        Place of the recording.
+        Path of the recording.
     meta
         The meta of the recording, to which the clock fits of devices are added.
     blocks
@@ -180,14 +180,14 @@ def write_recording(
     annotations
         Labels of rows, by stream and name.
     replace
-        Whether a file that is there is replaced.
+        True: an existing file is replaced.
 
     Raises
     ------
     RigError
         If a block does not fit its stream.
     RecordingError
-        If there is a file and it is not to be replaced, or the disk refuses.
+        If the file exists and `replace` is False, or the disk refuses to write.
     """
     specs = layout.specs_by_name(meta)
     stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
@@ -199,7 +199,7 @@ def write_recording(
 
 
 def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
-    """Return the columns of `block` as they are stored; quality only if a sample is not good.
+    """Return the columns of `block` in their stored types; quality only if a sample is not good.
 
     Raises
     ------
@@ -209,7 +209,7 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
     spec = specs.get(block.stream)
     if spec is None:
         raise RigError(
-            f"A block of stream {block.stream!r} was received; the recording has {', '.join(sorted(specs))}.",
+            f"A block is of stream {block.stream!r}; the recording's streams are {', '.join(sorted(specs))}.",
             hint="Declare the stream in the sensor's spec or the rig's reference.",
         )
     name = f"A block of stream {block.stream!r}"
@@ -222,13 +222,13 @@ def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, Stream
         if np.shape(values) != shape or (one in numbers and values.dtype.kind not in "iu"):
             raise RigError(
                 f"{name} has {one} ({values.dtype}) of shape {np.shape(values)}, where {shape} is expected.",
-                hint="A block is rows by channels, in the order of the stream's spec; times and sequence numbers are "
-                "whole numbers, one a row, never invented.",
+                hint="Give samples as (rows, channels), in the order of the spec; times and sequence numbers as "
+                "whole numbers, one for each row, never invented.",
             )
     if (block.t_ns is None) != (meta.clock == "none"):
         raise RigError(
             f"{name} has {'no times' if block.t_ns is None else 'times'}; the recording's clock is {meta.clock!r}.",
-            hint="Give every block its times, or state that there is no clock; never invent one.",
+            hint="Give every block its times, or declare the clock `none`; never invent times.",
         )
     quality = columns.pop("quality", np.zeros(np.shape(block.data), dtype=np.uint8)).astype(np.uint8)
     learnt = [one.kind in ("force", "torque") and spec in meta.reference for one in spec.channels]
@@ -252,16 +252,16 @@ def _stored(data: Array, spec: StreamSpec) -> Array:
         or not ((data >= limits.min) & (data <= limits.max) & (np.rint(data) == data)).all()
     ):
         raise RigError(
-            f"Stream {spec.name!r} stores {spec.dtype}, and a reading does not fit it without loss.",
+            f"Stream {spec.name!r} stores {spec.dtype}, in which a reading cannot be stored without loss.",
             hint="Round and clip in the rig, or declare a wider dtype in the sensor's spec.",
         )
     return data.astype(declared)
 
 
 def recovery(journal: Path, path: Path) -> str:
-    """Return a sentence with the journal of an unfinished recording, and the command that makes a recording of it."""
+    """Return a sentence with the path of a journal, and the command that converts it to a recording."""
     import shlex
 
     rescued = path.with_name(f"{path.stem}-rescued{path.suffix}") if path.exists() else path
     command = shlex.join(["tactbench", "inspect", str(journal), "--rescue", str(rescued)])
-    return f"What was recorded is in {journal}; make a recording of it:  {command}"
+    return f"The rows recorded so far are in {journal}; convert it to a recording:  {command}"

@@ -115,7 +115,7 @@ MISTAKES = [
     ("rig", "(self.force +", "(-self.force +", "press-is-recorded", "sign"),
     ("rig", "default_rng(seed)", "default_rng(0)", "force-and-seed-decide", "two seeds"),
     ("rig", "default_rng(seed)", "default_rng()", "force-and-seed-decide", "the same seed"),
-    ("rig", "t_ns, data)", "t_ns[::-1].copy(), data)", "press-is-recorded", "time runs backwards"),
+    ("rig", "t_ns, data)", "t_ns[::-1].copy(), data)", "press-is-recorded", "backwards"),
     ("rig", "self.t_s * 1e9", "self.t_s * 1e3", "press-is-recorded", "milliseconds"),
     ("rig", '{"rate_hz": 100.0}', '{"rate_hz": 200.0}', "press-is-recorded", "200 Hz is stated"),
     ("rig", "t_ns, data)", "t_ns, data[:, 1:])", "press-is-recorded", "of shape (100, 11)"),

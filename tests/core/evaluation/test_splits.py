@@ -132,7 +132,7 @@ def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
 
 
 def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says_so(tmp_path):
-    why = "incomplete: force_torque: nothing for 4 s from 2 s on"
+    why = "incomplete: force_torque: silent for 4 s from 2 s on"
     paths = sessions(tmp_path)
     for name, excluded in (("short", why), ("bad", "declared unreliable")):
         paths.append(record(tmp_path / f"{name}.h5", *ramp(7), session=name, excluded=excluded))

@@ -49,7 +49,7 @@ def test_a_whole_recording_lacks_nothing():
     ],
 )
 def test_silence_is_missing(keep, span):
-    assert lacking(keep=keep) == [("force", "nothing", *span)]
+    assert lacking(keep=keep) == [("force", "silent", *span)]
     assert lacking(keep=keep, silent_s=7.5) == []
 
 
@@ -57,7 +57,7 @@ def test_rows_without_a_number_or_marked_missing_are_silence():
     found, row = Completeness(Allowed(), (), (FORCE,)), np.arange(100)[:, None]
     quality = Quality.MISSING * (row > 50).astype(np.uint8) * (row < 75)
     found.add(Block("force", row[:, 0] * 10**8, np.where(row < 75, row, np.nan), quality))
-    assert facts(found) == [("force", "nothing", 4.9, 5)]
+    assert facts(found) == [("force", "silent", 4.9, 5)]
 
 
 def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_meanwhile():

@@ -1,8 +1,8 @@
 """Import of foreign tables into recordings, as a mapping file describes them.
 
-``model`` has the keys of a mapping file. ``files`` finds the files, and the words in their paths; ``table`` and
-``formats`` read them. ``channels`` names the channels, ``samples`` converts cells into samples with a quality each, and
-``importing`` writes the recordings.
+``model`` defines the keys of a mapping file. ``files`` finds files and words (named values) in their paths; ``table``
+and ``formats`` read tables. ``channels`` names the channels, ``samples`` converts cells into samples with a quality
+each, and ``importing`` writes the recordings.
 """
 
 from tactbench.core.recording.mapping.importing import Imported, ImportReport, import_tables

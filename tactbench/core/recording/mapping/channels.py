@@ -1,4 +1,4 @@
-"""Channels of the groups of columns in a mapping: ranges and patterns are spelled out once for all recordings."""
+"""Channels from the groups of columns in a mapping file, with ranges and name patterns expanded."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class MappedStream:
 
 
 def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
-    """Return `pattern` with each ``{word}`` filled in; raises MappingError for a word that is not known."""
+    """Return `pattern` with each ``{word}`` replaced by its value; raises MappingError for an unknown word."""
 
     def word(match: re.Match[str]) -> str:
         name = match.group(1)
         if name not in words:
             raise MappingError(
-                f"{what}: {pattern!r} has the word {name!r}, which is not known; known are: "
+                f"{what}: {pattern!r} has the unknown word {name!r}; known words: "
                 f"{', '.join(sorted(words)) or 'none'}.",
                 hint="Words come from named groups of `path`, from `split_by`, `per_recording`, `words` and `over`.",
             )
@@ -56,13 +56,13 @@ def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
 def no_translation(where: str, text: str, word: str, known: Mapping[str, str]) -> MappingError:
     """Return the error for a text that is not among the `known` translations of a word or label."""
     return MappingError(
-        f"{where} {text!r} has no translation for {word!r}; there are: {', '.join(known)}.",
-        hint="Add it to `values`; of a label, translate what means 'no label' to an empty text.",
+        f"{where} {text!r} has no translation for {word!r}; translated are: {', '.join(known)}.",
+        hint="Add the text to `values`; translate texts that mean 'no label' to an empty text.",
     )
 
 
 def expand(text: Scalar) -> Iterator[Scalar]:
-    """Yield the members of a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; else the text itself."""
+    """Yield the members of a range: ``1..3`` gives 1, 2, 3; ``e_1..3`` gives e_1, e_2, e_3; other text is unchanged."""
     match = _RANGE.match(text) if isinstance(text, str) else None
     if match is None:
         yield text
@@ -75,7 +75,7 @@ def expand(text: Scalar) -> Iterator[Scalar]:
 
 
 def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]]:
-    """Return the sensor, and all streams with their columns; words in its name are not filled in yet.
+    """Return the sensor, and all streams with their columns; ``{word}`` in the sensor's name is not replaced yet.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]
 
 
 def columns_of(group: ChannelGroup) -> list[Column]:
-    """Return the columns of a group, with its ranges spelled out."""
+    """Return the columns of a group, with ranges like ``1..3`` expanded."""
     given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
     return [one if isinstance(one, int) else str(one) for text in given for one in expand(text)]
 

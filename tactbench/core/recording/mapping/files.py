@@ -1,4 +1,4 @@
-"""Search for the files of each recording: patterns, words in paths, and tables that belong together."""
+"""Search for the files of each recording by path patterns, and pairing of tables by words in their paths."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SAME_GROUPS = "Give both `path` expressions the same named groups."
 
 @dataclass(frozen=True)
 class FoundFile:
-    """A file, its path below the root folder, and the words in that path."""
+    """A file, its path below the root folder, and the words (named values) in that path."""
 
     path: Path
     shown: str
@@ -41,14 +41,14 @@ class FoundFile:
 
 
 class FileSet(NamedTuple):
-    """Files that belong together, by their table, and the words of all their paths."""
+    """Files of the same recordings, by the name of their table, and the words in all their paths."""
 
     files: dict[str, FoundFile]
     words: Words
 
 
 class RawRecording(NamedTuple):
-    """The tables of one recording as they were read, its words, and the paths of its files below the root folder."""
+    """The unconverted tables of one recording, its words, and the paths of its files below the root folder."""
 
     tables: dict[str, Table]
     words: Words
@@ -56,13 +56,13 @@ class RawRecording(NamedTuple):
 
 
 def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
-    """Return the files that belong together, in the order of the first table's paths, and sentences about the others.
+    """Return the files that belong together, in the order of the first table's paths, and sentences about other files.
 
     Raises
     ------
     MappingError
-        If a pattern finds no file, or links to files that are not here, a path lacks the words, a file has several
-        partners, or none has one.
+        If a pattern matches no file, or broken links, a path does not match its expression, a file has several matches
+        in another table, or no file has a match.
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
@@ -86,7 +86,7 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
             if len(fitting) == 1:
                 files[name], words = fitting[0], {**fitting[0].words, **words}
                 continue
-            text = f"{leader.shown} needs one file of table {name!r} with the words {needed}; there are {len(fitting)}."
+            text = f"{leader.shown} needs one file of table {name!r} with the words {needed}; {len(fitting)} are found."
             left_out.append(text)
             if fitting:
                 raise MappingError(text, hint=_SAME_GROUPS)
@@ -102,7 +102,7 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
 
 
 def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
-    """Yield the recordings of files that belong together: one, or those of an array or of the values of a column."""
+    """Yield the recordings in files that belong together: one, or several by an array's axis or by `split_by`."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
     tables: dict[str, Table] = {}
     topics: dict[FoundFile, dict[str, Topic]] = {}
@@ -129,7 +129,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
         if mapping.join is not None and mapping.join.by == "rows" and len(table) != len(lead):
             raise MappingError(
                 f"{table.shown} has {len(table)} rows, {lead.shown} has {len(lead)}.",
-                hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
+                hint="Tables joined by rows must be equally long; if each has a clock, write `by: clock`.",
             )
     if not mapping.split_by:
         yield RawRecording(tables, files.words, shown)
@@ -143,7 +143,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
 
 
 class Shape(NamedTuple):
-    """The columns of a table: of its first file, `shown`, of all files, and those that the mapping uses."""
+    """Columns of a table: in its first file, `shown`; in any of its files; and columns that the mapping uses."""
 
     shown: str
     columns: tuple[Column, ...]
@@ -152,7 +152,7 @@ class Shape(NamedTuple):
 
 
 def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Shape]) -> None:
-    """Raise MappingError if a table has other columns than the first file where the mapping names places."""
+    """Raise MappingError if columns that the mapping gives by place differ from those in the table's first file."""
     for name, table in raw.tables.items():
         if name not in shapes:
             shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name))
@@ -163,12 +163,12 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
             if by_place and one != other and (place in by_place or None in (one, other)):
                 raise MappingError(
                     f"Column {place} is {one!r} in {table.shown} and {other!r} in {first.shown} (table {name!r}).",
-                    hint="Repair the file, import it by another mapping, or name the columns by their headers.",
+                    hint="Repair the file, import it by another mapping, or give columns by their names.",
                 )
 
 
 def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
-    """Yield a sentence for each table that names the columns that the mapping does not use."""
+    """Yield a sentence for each table with unused columns, with the names of these columns."""
     for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
@@ -176,7 +176,7 @@ def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
 
 
 def used_columns(mapping: Mapping, name: str) -> Used:
-    """Return the columns of a table that the mapping uses."""
+    """Return the columns of a table that the mapping uses; True for readings, False for texts and times."""
     streams, time = [one for one in mapping.streams.values() if one.table == name], mapping.tables[name].time
     numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
     texts = [note.column for one in streams for note in one.annotations.values() if note.column is not None]
@@ -185,7 +185,7 @@ def used_columns(mapping: Mapping, name: str) -> Used:
 
 
 def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFile], dict[str, str]]:
-    """Return the files of a table, and a sentence about the other matches by the obstacle to reading them."""
+    """Return the files of a table and, by obstacle to reading, a sentence about matching files that are left out."""
     ending = found[0] if (found := re.search(r"\.\w+$", source.files)) else ""
     in_any_case = re.sub("[A-Za-z]", lambda letter: f"[{letter[0].lower()}{letter[0].upper()}]", ending)
     kinds: dict[str, list[str]] = {"": []}
@@ -209,7 +209,7 @@ def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFil
     if BROKEN_LINKS in notes:
         raise MappingError(
             f"{notes[BROKEN_LINKS]}.",
-            hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
+            hint="Fetch files of git-annex: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
     if not kinds[""]:
         raise MappingError(

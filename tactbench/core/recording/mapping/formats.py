@@ -56,17 +56,17 @@ _SIGNATURES: dict[bytes, tuple[str, str, str]] = {
     b"\x93NUMPY": ("is a NumPy array", "npy", ""),
     b"\x89MCAP0": ("is an MCAP bag", "mcap", ""),
 }  # fmt: skip
-"""Kind of a file by its first bytes, the format that reads it, and the next step if none does."""
+"""By a file's first bytes: its kind, the name of the format that can read it, and the next step if no format can."""
 
 MESSAGE_TIMES = ("log_time", "publish_time")
-"""Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
+"""Columns that every message has beside its fields: its times of writing and of sending [ns]."""
 
 Topic = tuple[Bag, Used, Time | None]
-"""A topic with its columns that are used, and its clock."""
+"""A topic of a bag, the topic's columns that a mapping uses, and the topic's clock."""
 
 
 def require_format(path: Path, shown: str, wanted: str) -> None:
-    """Raise MappingError if a file cannot be read, or is by its first bytes of another format than `wanted`."""
+    """Raise MappingError if a file cannot be read, or if its first bytes show another format than `wanted`."""
     try:
         with path.open("rb") as opened:
             first = opened.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()
@@ -93,29 +93,29 @@ def require_format(path: Path, shown: str, wanted: str) -> None:
 
 @contextmanager
 def whole(shown: str, what: str, hint: str) -> Iterator[None]:
-    """Return a context that turns whatever a damaged file makes of a library into MappingError."""
+    """Return a context manager that raises any error of a library with a damaged file as MappingError."""
     try:
         yield
     except MappingError:
         raise
     except Exception as error:
-        raise MappingError(f"{shown} is no whole {what}: {type(error).__name__}: {error}.", hint=hint) from error
+        raise MappingError(f"{shown} is not a valid {what}: {type(error).__name__}: {error}.", hint=hint) from error
 
 
 def extra(name: str, shown: str, *modules: str) -> list[Any]:
-    """Return modules that an extra installs; raises MappingError, which names it, if they cannot be imported."""
+    """Return the modules of the optional extra `name`; raises MappingError, with its name, if it is not installed."""
     try:
         return [importlib.import_module(module) for module in modules]
     except ImportError as error:
         raise MappingError(
-            f"{shown} needs an extra: {error}.", hint=f"Install it: `pip install 'tactbench[{name}]'`."
+            f"Reading {shown} needs an optional extra: {error}.", hint=f"Install it: `pip install 'tactbench[{name}]'`."
         ) from error
 
 
 def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, Table]]:
     """Yield the table of each recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
-    `known` are the words of the path, which are filled into the names of further files.
+    `known` are the words in the file's path, which replace ``{word}`` in the names of further files.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
     values = arrays[how.array]
     if values.ndim != len(how.axes) or values.dtype.kind not in "iufb" or not values.size:
         raise MappingError(
-            f"{shown}: array {how.array!r} of {values.dtype} has the axes {values.shape}, where {', '.join(how.axes)} "
+            f"{shown}: array {how.array!r} of {values.dtype} has the shape {values.shape}; axes {', '.join(how.axes)} "
             "of numbers are expected.",
             hint="Name each axis: recording, row or channel; or name another array.",
         )
@@ -141,7 +141,7 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         if arrays[name].shape != (len(ordered),):
             raise MappingError(
                 f"{shown}: array {name!r} for {word!r} has shape {arrays[name].shape}, not ({len(ordered)},).",
-                hint="It must hold one value a recording.",
+                hint="It must have one value for each recording.",
             )
     wide = len(str(len(ordered) - 1))
     for index, rows in enumerate(ordered):
@@ -152,7 +152,7 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
 
 
 def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]:
-    """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
+    """Return arrays by name; `names` gives each name with its words replaced, for `npy` the name of a file."""
     if how.format == "npy":
         files = {name: path.parent / file if file else path for name, file in names.items()}
         return {name: np.load(file, allow_pickle=False) for name, file in files.items()}
@@ -167,13 +167,13 @@ def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]
             found = {name: archive[name] if name in names else None for name in archive.files}
     for name in names:
         if name not in found:
-            hint = f"{did_you_mean(name, found)}It has: {', '.join(sorted(found))}."
+            hint = f"{did_you_mean(name, found)}Its arrays: {', '.join(sorted(found))}."
             raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
     return found
 
 
 def _shaped(values: Array, axes: int) -> Array:
-    """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
+    """Return an array with `axes` axes; MATLAB stores n values as (n, 1) or (1, n), and drops last axes of length 1."""
     if axes < 2 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))
@@ -185,7 +185,7 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
     Raises
     ------
     MappingError
-        If openpyxl is not installed, the file is no workbook, the sheet is not in it, or it is empty.
+        If openpyxl is not installed, the file is no workbook, or the sheet is missing or empty.
     """
     (openpyxl,) = extra("xlsx", shown, "openpyxl")
     hint = "Open it and save the sheet as CSV."
@@ -196,7 +196,7 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
         name = names[0] if how.sheet is None and len(names) == 1 else how.sheet
         if name not in names:
             raise MappingError(
-                f"{shown} has {len(names)} sheets, none called {name!r}.",
+                f"{shown} has {len(names)} sheets, but no sheet {name!r}.",
                 hint=f"Write `sheet:` with one of: {', '.join(names)}.",
             )
         lines = []
@@ -219,7 +219,7 @@ def _text(value: Any) -> str:
 
 
 def read_parquet(path: Path, shown: str, used: Used) -> Table:
-    """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
+    """Return the table of the `used` columns; lists of equal length become columns ``name.0``, ``name.1`` ...
 
     Raises
     ------
@@ -239,7 +239,7 @@ def read_parquet(path: Path, shown: str, used: Used) -> Table:
         column = read.column(name)
         first = column[0].as_py()
         parts = {f"{name}.{place}": place for place in range(len(first))} if isinstance(first, list) else {}
-        with whole(shown, f"table: the lists of {name!r} differ in length", "Only lists of one length are read."):
+        with whole(shown, f"table: the lists of {name!r} differ in length", "Only lists of equal length can be read."):
             found |= {part: compute.list_element(column, place) for part, place in parts.items()} or {name: column}
     every = (*found, *(name for name in names if name not in read.column_names))
     values: dict[Column, Any] = {}
@@ -254,12 +254,12 @@ def read_parquet(path: Path, shown: str, used: Used) -> Table:
                 values[column] = (one.cast("string") if arrow.types.is_timestamp(one.type) else one).to_pylist()
         except arrow.ArrowException as error:
             hint = f"Name another column; {error}."
-            raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
+            raise MappingError(f"{shown}: {column!r} has values that are not numbers.", hint=hint) from error
     return Table(shown, every, range(read.num_rows), values)
 
 
 def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, Table]:
-    """Return tables by their name, of topics that are read in one pass of a bag.
+    """Return a table for each of `topics`, by name, read in one pass through an MCAP bag.
 
     Raises
     ------
@@ -276,9 +276,7 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, T
     schemas: dict[int, Any] = {}
     seen: set[str] = set()
     stream, ros = extra("mcap", shown, "mcap.stream_reader", "mcap_ros2.decoder")
-    damaged = whole(
-        shown, "bag", "A recorder that was killed leaves such a bag: `mcap recover` keeps what can be read."
-    )
+    damaged = whole(shown, "bag", "If its recorder was killed: `mcap recover` keeps the part that can be read.")
     with damaged, path.open("rb") as opened:
         # The records end at the bag's footer, which a bag that was cut short has not.
         for record in stream.StreamReader(opened, validate_crcs=True).records:
@@ -298,7 +296,7 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, T
     for name, (how, used, clock) in topics.items():
         topic = how.topic
         if not counts[name]:
-            hint = f"{did_you_mean(topic, seen - {topic})}It has: {', '.join(sorted(seen))}."
+            hint = f"{did_you_mean(topic, seen - {topic})}Its topics: {', '.join(sorted(seen))}."
             raise MappingError(f"{shown} has no message of topic {topic!r}.", hint=hint)
         if clock is not None and isinstance(values[name][clock.column][0], int) and nanoseconds_per(clock) != 1:
             raise MappingError(
@@ -317,13 +315,13 @@ def _decoder(ros: Any, channel: Any, schema: Any, shown: str) -> Callable[[bytes
         raise MappingError(
             f"{shown}: topic {channel.topic!r} is encoded as {channel.message_encoding} "
             f"({schema.encoding if schema else 'no schema'}).",
-            hint="ROS 2 messages (cdr, ros2msg) and JSON are read; `rosbags-convert` makes ROS 2 of ROS 1.",
+            hint="ROS 2 messages (cdr, ros2msg) and JSON can be read; `rosbags-convert` converts ROS 1 bags.",
         )
     return found
 
 
 def _take(record: Any, decode: Any, topic: Topic, values: dict[Column, Any], where: str) -> None:
-    """Add the columns of one message to `values`."""
+    """Append the used fields of one message to the columns in `values`."""
     column: Column | None = None
     try:
         message = decode(record.data)
@@ -351,7 +349,7 @@ def _field(message: Any, path: str) -> Any:
 
 
 def _stamp(value: Any) -> Any:
-    """Return a stamp in whole nanoseconds, `builtin_interfaces/Time` in either spelling, or the number that it is."""
+    """Return a time stamp of ROS 1 or 2 (seconds and nanoseconds) in whole nanoseconds; a number unchanged."""
     if isinstance(value, int | float):
         return value if isinstance(value, float) else Decimal(value)
     fields = value if isinstance(value, dict) else {name: getattr(value, name) for name in value.__slots__}

@@ -1,4 +1,4 @@
-"""The import of all recordings that a mapping describes, of which none is kept if one fails; and of a device's log."""
+"""Import of all recordings that a mapping file describes (after an error, of none), and of a sensor's log file."""
 
 from __future__ import annotations
 
@@ -50,31 +50,31 @@ from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
-"""Name of the rig in imported recordings, which another laboratory has made."""
+"""Name, in the meta of imported recordings, that stands for the unknown rig of another laboratory."""
 
 ENDING = ".h5"
 WAITING, PLACING = ".importing-", ".placing-"
-"""Prefixes of the folders in which the recordings of an import wait, and from which they are moved to their place."""
-_OTHERWISE = "Give another folder with --out DIR, or replace it with --replace."
+"""Prefixes of an import's temporary folder: while it writes recordings, and while it moves them to their place."""
+_OTHERWISE = "Give another folder with --out DIR, or replace the file with --replace."
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
 @dataclass(frozen=True)
 class Imported:
-    """One recording that an import has written."""
+    """A recording written by an import, with its counts and findings."""
 
     path: Path
     meta: RecordingMeta
     rows: int
-    """Rows of its longest stream."""
+    """Number of rows of the recording's longest stream."""
     missing: dict[str, int]
-    """Samples marked as missing, by channel."""
+    """Number of samples marked as missing, by channel."""
     findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
 class ImportReport:
-    """Files and columns that an import has read, written and left out."""
+    """Report of an import: files read, recordings written, and files and columns left out."""
 
     title: str
     recordings: tuple[Imported, ...]
@@ -82,18 +82,18 @@ class ImportReport:
     tasks: tuple[str, ...] = ()
     """Names of the tasks that the mapping declares."""
     left_out: tuple[str, ...] = ()
-    """A sentence for each kind of files that match a pattern and make no recording."""
+    """Sentences about files that match a pattern but are not imported."""
     unused: tuple[str, ...] = ()
-    """A sentence for each table with columns that are not used."""
+    """Sentences about columns that the mapping does not use, one for each table."""
 
     @property
     def rows(self) -> int:
-        """Rows of all recordings."""
+        """Number of rows of all recordings together."""
         return sum(recording.rows for recording in self.recordings)
 
     @property
     def missing(self) -> dict[str, int]:
-        """Samples marked as missing in all recordings, by channel."""
+        """Number of samples marked as missing in all recordings together, by channel."""
         return dict(sum((Counter(recording.missing) for recording in self.recordings), Counter()))
 
 
@@ -109,17 +109,17 @@ def import_tables(
     root
         Folder of the data set; None is the folder of the mapping file.
     out
-        Folder for the recordings. All of them are placed there or, if anything is wrong, none.
+        Folder for the recordings. After an error, no recording is placed there.
     progress
         Receives a step for every recording.
     replace
-        Whether recordings of the same name that hold something else are replaced; otherwise they are an error. One that
-        holds the same is left as it is.
+        True: existing recordings of the same name with other content are replaced; False: they are an error. Existing
+        recordings with the same content are kept.
 
     Raises
     ------
     ConfigError
-        If the mapping file is wrong; the message names its line.
+        If the mapping file is not valid; the message names the line.
     MappingError
         If a table does not fit the mapping; the message names file, line and column where there are any.
     UnwritableError
@@ -132,7 +132,7 @@ def import_tables(
     beside: list[Finding] = []
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
-        text = f"its import left files out: {left_out[0]}{more}"
+        text = f"the import left files out: {left_out[0]}{more}"
         beside.append(Finding("left-out", "warning", text))
     made: list[Imported] = []
     shapes: dict[str, Shape] = {}
@@ -175,20 +175,20 @@ def import_log(
     labels: AnyMapping[str, Scalar],
     replace: bool,
 ) -> ImportReport:
-    """Convert a log of a sensor's own tools into a recording, which is written whole or not at all.
+    """Convert a log file of a sensor's own tools into a recording; after an error, no recording is written.
 
     Parameters
     ----------
     log
-        The file, of a format that the sensor's reader knows.
+        The log file, in a format that the sensor's log reader supports.
     options
-        For the reader, by its own names.
+        Options of the log reader, by name.
     out
         The recording.
     session, role, labels
-        As of :class:`~tactbench.core.spec.recording.RecordingMeta`.
+        As the fields of :class:`~tactbench.core.spec.recording.RecordingMeta`.
     replace
-        Replace what `out` holds.
+        True: an existing file at `out` is replaced.
 
     Raises
     ------
@@ -206,9 +206,9 @@ def import_log(
             hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
         )
     if not log.is_file():
-        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
+        raise MissingRecordingError(f"There is no log {log}.", hint="Check the path.")
     if out.suffix != ENDING:
-        raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
+        raise UsageError(f"{out} is no file name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
     try:
         found: DeviceLog = load_object(sensor.log_reader)(log, options)
     except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
@@ -234,7 +234,7 @@ def import_log(
 
 
 def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **about: object) -> list[Path]:
-    """Write recordings of tables in memory, as :func:`import_tables` does; `about` are further fields of their meta."""
+    """Write recordings from tables in memory, like :func:`import_tables`; `about`: further fields of their meta."""
     sensor, streams = sensor_of(mapping)
     _write_tasks(out, _tasks_text(mapping))
     metas = [(raw, _meta(mapping, raw, sensor, streams).model_copy(update=about)) for raw in raws]
@@ -242,7 +242,7 @@ def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **a
 
 
 def _tasks_text(mapping: Mapping) -> str:
-    """Return the text of the file of tasks beside the recordings; empty if the mapping declares none."""
+    """Return the text of the tasks file for the folder of the recordings; empty if the mapping declares no tasks."""
     if not mapping.tasks:
         return ""
     tasks = [task.model_dump(mode="json", exclude_unset=True) for task in mapping.tasks]
@@ -258,9 +258,9 @@ def _write_tasks(folder: Path, text: str) -> None:
 
 @contextmanager
 def aside(out: Path) -> Iterator[Path]:
-    """Return a context with the folder in which recordings wait until all are written; it is hidden from rigs.
+    """Return a context manager of a temporary folder, ignored by rigs, for recordings until all are written.
 
-    Leftovers of an import that was killed are removed, or moved to their place where that had begun.
+    Recordings of a killed import are removed or, if it had begun to move them to their place, moved there.
     """
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
@@ -280,7 +280,7 @@ def aside(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[bool]:
-    """Return a context with whether this process could lock the folder of an import."""
+    """Return a context manager that locks an import's folder; its value is True if this process has the lock."""
     lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
     try:
         yield bool(try_lock(lock))
@@ -307,7 +307,7 @@ def _write(
     streams: dict[str, MappedStream],
     beside: Sequence[Finding],
 ) -> Imported:
-    """Write one recording with its findings, to which `beside` adds those of the import as a whole."""
+    """Write one recording with its findings; `beside` are further findings about the whole import."""
     clocks = {
         name: times(table, time)
         for name, table in raw.tables.items()
@@ -365,9 +365,9 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict
         )
     reasons = [one.reason for one in mapping.exclude if any(fnmatchcase(file, one.files) for file in raw.files)]
     unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
-    remarks = [f"What time zero means in table {name} is not known." for name in unknown]
+    remarks = [f"The meaning of time zero in table {name} is not known." for name in unknown]
     if mapping.clock == "none":
-        remarks = ["No clock: the source gives no time and no rate; rows are ordered, that is all."]
+        remarks = ["No clock: the source gives no times and no rate, only the order of rows."]
     about = {one: fill(getattr(mapping.sensor, one), words, f"sensor.{one}") for one in ("name", "title")}
     try:
         return RecordingMeta.model_validate(given | {
@@ -387,7 +387,7 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict
         })  # fmt: skip
     except ValidationError as error:
         raise MappingError(
-            f"{origin} makes no recording: {complaint(error)}.", hint="Translate its words under `words`."
+            f"{origin} gives no valid recording: {complaint(error)}.", hint="Translate words in its path under `words`."
         ) from error
 
 
@@ -404,7 +404,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
 
 
 def _in_place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Return the recordings with their place in `out`; those that lie there already are not moved."""
+    """Return the recordings with their paths in `out`; those already there with the same content are not moved."""
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:
@@ -412,6 +412,6 @@ def _in_place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imp
             with suppress(RecordingError):
                 there = content_digest(target)
             if there != content_digest(one.path):
-                raise MappingError(f"{target} exists already and holds something else.", hint=_OTHERWISE)
+                raise MappingError(f"{target} exists already and has other content.", hint=_OTHERWISE)
             one.path.unlink()
     return [replaced(one, path=out / one.path.name) for one in made]

@@ -21,8 +21,8 @@ Column = int | str
 
 WORD = r"^[a-z][a-z0-9_]*$"
 MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
-"""Kinds of channels that are learnt, and the unit to which theirs must convert. A mapping lists the numbers that mean
-"no sample" in them, which would be learnt too."""
+"""Kinds of channels that estimators learn, and the unit to which a channel's unit must convert. A mapping must list the
+numbers that mean "no sample" in such channels, as these would be learnt too."""
 
 
 class Tabular(Frozen):
@@ -31,14 +31,14 @@ class Tabular(Frozen):
     header: bool
     """True: the first line names the columns. False: the file has no such line, and columns are numbered from 0."""
     skiprows: int | tuple[int, ...] = 0
-    """Lines that are left out: how many at the beginning, or the list of their places, counted from 0."""
+    """Lines to leave out: their number at the beginning of the file, or a list of their places, counted from 0."""
     no_sample: tuple[str, ...] = ()
     """Texts that stand for "no sample" where a cell holds nothing else, for example "" or "NA"."""
     decimal: str = Field(default=".", min_length=1, max_length=1)
     thousands: str | None = Field(default=None, min_length=1, max_length=1)
-    """The mark between groups of three digits; None: there is none."""
+    """The mark between groups of three digits; None: digits are not grouped."""
     comment: str | None = Field(default=None, min_length=1, max_length=1)
-    """The mark that begins a comment, which ends with its line; None: there are no comments."""
+    """The mark that begins a comment, which ends with its line; None: the file has no comments."""
 
     @model_validator(mode="after")
     def _marks_differ(self) -> Tabular:
@@ -61,7 +61,7 @@ class Text(Tabular):
 
 
 class Records(Tabular):
-    """A text file in which several lines of numbers make a row; its columns are numbered from 0 through these lines."""
+    """A text file in which several lines of numbers make a row; columns are numbered from 0 across these lines."""
 
     format: Literal["records"] = "records"
     header: Literal[False] = False
@@ -87,7 +87,7 @@ class Arrays(Frozen):
     """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
     """Meaning of each axis of the array, in order; an axis that is left out has length 1. Several axes of channels are
-    read as one, of which the last runs fastest."""
+    read as one, of which the last axis varies fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
     """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
     the same folder, in which ``{word}`` is filled in."""
@@ -95,16 +95,16 @@ class Arrays(Frozen):
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
         if (self.format == "npy") == bool(self.array):
-            raise ValueError("array names one of several in an npz or mat file, and nothing in an npy file")
+            raise ValueError("array must name an array of an npz or mat file, and is not allowed for an npy file")
         if max(self.axes.count("recording"), self.axes.count("row")) > 1:
-            raise ValueError("axes name recording or row twice; only channel may stand several times")
+            raise ValueError("axes name recording or row twice; only channel may occur several times")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
 
 
 class Bag(Frozen):
-    """A topic of an MCAP bag: a message is a row, columns are paths of fields, ``wrench.force.z`` or ``data.0..63``."""
+    """A topic of an MCAP bag; rows are messages, columns are paths of fields, ``wrench.force.z`` or ``data.0..63``."""
 
     format: Literal["mcap"] = "mcap"
     topic: str
@@ -117,7 +117,7 @@ class Parquet(Frozen):
 
 
 class Time(Frozen):
-    """The clock of a table: the column with the time of each row. Times are never made up from a rate."""
+    """The clock of a table: the column with the time of each row. Times are never computed from a rate."""
 
     column: Column
     unit: str
@@ -126,7 +126,7 @@ class Time(Frozen):
     zone: str | None = None
     """Time zone of dates that have none of their own, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
-    """Number at which the counter begins at 0 again, for example 4294967296; None: it never does."""
+    """Number at which the counter restarts at 0, for example 4294967296; None: it never restarts."""
     offset_s: float = 0.0
     """Seconds that are added to all times, where one clock is known to lag behind another."""
 
@@ -151,7 +151,7 @@ class TableSource(Frozen):
     """The files of one table: all have the same columns, and each belongs to one recording or to several."""
 
     files: str
-    """Pattern of their paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
+    """Pattern of the files' paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
     path: re.Pattern[str] = re.compile("")
     """Regular expression that is searched for in each path; its named groups become words."""
     read: Annotated[Csv | Text | Records | Xlsx | Arrays | Bag | Parquet, Field(discriminator="format")]
@@ -169,19 +169,19 @@ class Join(Frozen):
     """The rule by which rows of several tables belong together."""
 
     by: Literal["rows", "clock"]
-    """`rows`: the rows of one number belong together. `clock`: every table keeps its own rows and its own times."""
+    """`rows`: rows with the same number belong together. `clock`: every table keeps its own rows and its own times."""
     times_within_ms: float | None = Field(default=None, gt=0)
-    """Largest difference of the times of one row [ms], needed where tables with clocks are joined by rows."""
+    """Largest difference between the times of joined rows [ms]; required if tables with clocks are joined by rows."""
 
 
 class Word(Frozen):
-    """A word that is made of another one."""
+    """A word (a named value) that is derived from another word."""
 
     of: str = Field(pattern=WORD)
     values: dict[Scalar, str] | None = None
     """Translation of the other word's values; a value that is not listed is an error."""
     divided_by: int | None = Field(default=None, ge=1)
-    """Divisor of a whole-number division, which makes blocks of consecutive numbers."""
+    """Divisor of a whole-number division of the other word, which maps consecutive numbers to one block number."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Word:
@@ -198,13 +198,13 @@ class ChannelGroup(Frozen):
     name: str
     """Name of the channel; of several columns a pattern, in which ``{column}`` or the words of `over` are filled in."""
     over: dict[Annotated[str, Field(pattern=WORD)], tuple[Scalar, ...] | str] = Field(default_factory=dict)
-    """Words and their values, a list or a range like ``1..12``: columns are named by all combinations of the values, of
-    which those of the last word run fastest."""
+    """Words and their values, a list or a range like ``1..12``: columns are named by all combinations of the values, in
+    which the last word varies fastest."""
     kind: ChannelKind
     unit: str
     """Unit in which the numbers are stored."""
     given_in: str | None = None
-    """Unit of the numbers in the column; None: the same."""
+    """Unit of the numbers in the column; None: the same as `unit`."""
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample". A force or torque must list them, or state ``[]``."""
     lower: float | None = None
@@ -224,7 +224,7 @@ class ChannelGroup(Frozen):
             _convertible(self.unit, measured)
         except ValueError as error:
             raise ValueError(
-                f"a {self.kind} is in {measured} or a unit that converts to it ({error}); a scale's kg is "
+                f"a {self.kind} needs the unit {measured} or a convertible unit ({error}); a scale's kg is "
                 "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
             ) from error
         if self.sentinels is None:
@@ -257,7 +257,7 @@ class StreamSource(Frozen):
     table: str
     of: Literal["sensor", "reference"] = "sensor"
     rate_hz: float | None = Field(default=None, gt=0)
-    """Nominal rate as the source states it [Hz]; None: it states none."""
+    """Nominal rate as the source states it [Hz]; None: no rate is stated."""
     rate_source: Source | None = None
     dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
     channels: tuple[ChannelGroup, ...] = Field(min_length=1)
@@ -274,28 +274,28 @@ class SensorDeclaration(Frozen):
     """Description of the sensor, as far as the source of the tables gives one."""
 
     name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
-    """Name of the sensor; words like ``{word}`` are filled in, so that one mapping covers several devices."""
+    """Name of the sensor; ``{word}`` is replaced by the word's value, so that one mapping covers several devices."""
     title: str
     principle: str
     principle_source: Source
     link_delay: Quantity | None = None
-    """Time from taking a sample to having it in the host [time]; None: not known."""
+    """Time from taking a sample to its receipt by the host [time]; None: not known."""
     references: tuple[str, ...] = ()
 
 
 class RecordingNames(Frozen):
-    """Texts from which the name and the labels of each recording are made; words like ``{word}`` are filled in."""
+    """Texts for the name and the labels of each recording, in which ``{word}`` is replaced by the word's value."""
 
     name: str
     session: str
     trial: str = ""
     role: str = ""
-    """Role of the recording: after words are filled in, train, validation, test or empty."""
+    """Role of the recording: train, validation, test or empty, after ``{word}`` is replaced."""
     labels: dict[Annotated[str, Field(pattern=WORD)], Scalar] = Field(default_factory=dict)
 
 
 class Exclusion(Frozen):
-    """Files whose recordings are imported and marked so that no evaluation uses them."""
+    """Files whose recordings are imported, but marked as excluded from all evaluations, with the reason."""
 
     files: str
     reason: str = Field(min_length=1)
@@ -305,13 +305,13 @@ class DataSource(Frozen):
     """Address, files and licence of a public data set."""
 
     address: str = Field(default="", pattern=r"^(https?://.*/)?$")
-    """URL of the folder with `files`, in one fixed state of it; empty: the files have no public address."""
+    """URL of the folder with `files`, in a fixed version; empty: the files have no public address."""
     licence: str
     citation: str
     measured: str
-    """The measured quantity or event, in one line."""
+    """The measured quantity or event of the data set, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
-    """Tasks that the recordings can answer; all are run where a command names none."""
+    """Tasks that the recordings can answer; a command that names no task runs all of these."""
     bytes: int = Field(ge=1)
     """Size of all files together [bytes]."""
     files: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]] = Field(min_length=1)
@@ -319,17 +319,17 @@ class DataSource(Frozen):
 
 
 class Mapping(Frozen):
-    """A mapping file: how the tables of a data set become recordings."""
+    """A mapping file: rules for converting the tables of a data set to recordings."""
 
     version: Literal[1]
     title: str
     sensor: SensorDeclaration
     clock: Literal["device", "host", "none"]
-    """The clock that made the times: the device's, the host's, or none."""
+    """The clock from which the times come: the device's, the host's, or none."""
     remarks: tuple[str, ...] = ()
     """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
-    """Tables by name. Each file of the first is joined by the files of the others that have the same words."""
+    """Tables by name. Each file of the first table is joined with the files of the others that have the same words."""
     join: Join | None = None
     split_by: dict[Annotated[str, Field(pattern=WORD)], Column] = Field(default_factory=dict)
     """Columns of the first table by word: each combination of their values becomes a recording, with the values as
@@ -339,20 +339,20 @@ class Mapping(Frozen):
     streams: dict[str, StreamSource] = Field(min_length=1)
     exclude: tuple[Exclusion, ...] = ()
     tasks: tuple[DeclaredTask, ...] = ()
-    """Tasks that the recordings can answer, beside the installed ones."""
+    """Tasks defined for these recordings, in addition to the installed tasks."""
     source: DataSource | None = None
-    """Source of the files; None: the mapping is for files that are there already."""
+    """Source of the files; None: the files must already be on this machine."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
         for name, stream in self.streams.items():
             if stream.table not in self.tables:
-                raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
+                raise ValueError(f"stream {name} names the table {stream.table!r}; tables are {', '.join(self.tables)}")
             if (self.tables[stream.table].time is None) != (self.clock == "none"):
-                raise ValueError(f"clock is {self.clock}, so that table {stream.table} must have a time (or none)")
+                raise ValueError(f"table {stream.table}: `time` is required, but not allowed with `clock: none`")
         join, several = self.join, len(self.tables) > 1
         if several and (join is None or any(isinstance(table.read, Arrays) for table in self.tables.values())):
-            raise ValueError("several tables need `join`, by rows or by clock, and can be no arrays")
+            raise ValueError("several tables need `join`, by rows or by clock, and cannot be arrays")
         if join is not None and join.by == "rows" and join.times_within_ms is None and several and self.clock != "none":
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if join is not None and join.by == "clock" and (self.clock == "none" or self.split_by):

@@ -1,4 +1,4 @@
-"""Conversion of cells into samples: units are converted, and cells without a sample are marked and counted."""
+"""Conversion of a table's cells into samples: units are converted, and cells without a sample are marked."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from tactbench.core.spec import units
 from tactbench.core.spec.recording import Scalar, composed
 
 OUTSIDE, FAR_OUTSIDE = 3.0, 30.0
-"""Distances of the smallest or largest value of a channel from all others, in ranges of these, above which it is taken
-for no reading: where it stands in short runs, and where it stands once or seldom."""
+"""Distances of a channel's smallest or largest value from all others, in multiples of the range of the others, above
+which it counts as no reading: for a value in short runs, and for a rare value."""
 SHORT_RUN, SELDOM, OFTEN = 3.0, 0.1, 0.3
-"""Longest mean run [rows], and largest shares of the rows. A contact has levels too, but stays on them."""
+"""Longest mean run of such a value [rows], and its largest shares of the rows. Levels of a real contact last longer."""
 APART = 5.0
-"""Distance of such a value from the sample before it, in mean steps of the others, if it lies within `OUTSIDE`."""
+"""Least distance of such a value within `OUTSIDE` from the sample before it, in mean steps of the other samples."""
 FEWEST_VALUES = 8
-"""Fewest other values that a channel must have to be judged."""
+"""Fewest other distinct values of a channel for which such a value is searched."""
 UNSIGNED_BITS = (8, 16, 32)
 """Widths of whole numbers whose negative values may have been stored without their sign."""
 MISSED = 0.05
-"""Share of the longest span that tables may lack in common before their spans are reported to differ."""
+"""Largest share of the longest table's time span that the tables may not have in common, without a report."""
 YEARS = (1970, 2200)
-"""Times since 1970 are taken for times in a wrong unit or epoch if they lie outside these years."""
+"""Years outside which times since 1970 count as times in a wrong unit or of a wrong epoch."""
 _NS_PER_YEAR = 365.2425 * 86400 * 1e9
 
 
 def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[StreamData, list[Finding]]:
-    """Return a stream of a recording from its table and clock, and findings about values that seem to be no readings.
+    """Return a recording's stream, made of a table and its clock, and findings about values that are no readings.
 
-    Data without a sample are NaN, or 0 in a stream of whole numbers, and marked as missing.
+    Cells without a sample become NaN, or 0 in a stream of whole numbers, and are marked as missing.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[
         for row, place in np.argwhere((data != np.rint(data)) | (data < limits.min) | (data > limits.max)):
             column = stream.channels[place].column
             raise MappingError(
-                f"{table.where(row)}: column {column!r}: {data[row, place]:g} is no {dtype}.",
+                f"{table.where(row)}: column {column!r}: {data[row, place]:g} cannot be stored as {dtype}.",
                 hint="Choose a wider `dtype` for the stream.",
             )
     quality = np.where(absent, Quality.MISSING, Quality.GOOD).astype(np.uint8)
@@ -75,7 +75,7 @@ def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[
 
 
 def times(table: Table, time: Time) -> IntArray:
-    """Return the clock of a table, (n,) nanoseconds.
+    """Return the times of a table's rows, (n,) [ns].
 
     Raises
     ------
@@ -87,7 +87,7 @@ def times(table: Table, time: Time) -> IntArray:
         period = time.wraps_at * unit
         for row in np.flatnonzero((stamps < 0) | (stamps >= period)):
             raise MappingError(
-                f"{table.where(row)}: column {time.column!r} is not below {time.wraps_at}.",
+                f"{table.where(row)}: column {time.column!r} is negative, or not below {time.wraps_at}.",
                 hint="Correct `wraps_at` under `time`.",
             )
         stamps = stamps + period * np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -period / 2)
@@ -102,12 +102,12 @@ def times(table: Table, time: Time) -> IntArray:
 
 
 def _labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
-    """Return a label for every row, (n,): a text, or the number of its stretch; raises MappingError."""
+    """Return a label for every row, (n,): a text, or the number of the row's stretch; raises MappingError."""
     if annotation.column is None:
         stretches = np.arange(len(table), dtype=np.int64) // (annotation.rows_per or 1)
         if len(table) % (annotation.rows_per or 1):
             raise MappingError(
-                f"{table.shown} has {len(table)} rows, no whole stretches of {annotation.rows_per} ({name}).",
+                f"{table.shown} has {len(table)} rows, no multiple of `rows_per` {annotation.rows_per} ({name}).",
                 hint="Add or remove rows, or correct `rows_per`.",
             )
         return stretches
@@ -122,12 +122,12 @@ def _labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]
 
 
 def translations(values: dict[Scalar, str]) -> dict[str, str]:
-    """Return the translations of texts that a mapping lists, in one form of Unicode."""
+    """Return a mapping file's translations of texts, with keys and values as texts in the same Unicode form."""
     return {composed(str(key)): composed(value) for key, value in values.items()}
 
 
 def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str, IntArray]) -> Iterator[Finding]:
-    """Compare the clocks of joined tables, and yield in what those of tables that are joined by them differ.
+    """Compare the clocks of joined tables; yield a finding for each difference between tables joined by clock.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
 
 
 def _kind(source: TableSource) -> str:
-    """Return the kind of stamps of a table, which has a clock."""
+    """Return a phrase about the source and epoch of a table's time stamps, for messages."""
     time = source.time
     assert time is not None
     logged = isinstance(source.read, Bag) and time.column in MESSAGE_TIMES
@@ -179,7 +179,7 @@ def _kind(source: TableSource) -> str:
 def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
     """Yield a finding for each number that seems to be no reading, in the (n, channels) numbers of a table.
 
-    Such numbers become NaN in `given`, so that the search for others goes on without them.
+    Such numbers are set to NaN in `given`, so that the search for further ones ignores them.
     """
     found: dict[str, dict[int, int]] = {}
     low, high = np.fmin.reduce(given), np.fmax.reduce(given)
@@ -189,7 +189,7 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
             jumps = _jumps(given[:, place], period)
             if jumps:
                 sound[place] = False
-                text = f"jumps between 0 and {period} in {{:g}} % of the rows, as numbers below 0 without a sign do"
+                text = f"jumps between 0 and {period} in {{:g}} % of the rows, as if negative numbers lost their sign"
                 found.setdefault(text, {})[int(place)] = jumps
     rows = np.isfinite(given).sum(axis=0)
     candidates = []
@@ -217,7 +217,7 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
 
 
 def _jumps(column: FloatArray, period: int) -> int:
-    """Return how often a column jumps by a period, give or take a usual step; 0 if it jumps in another way too."""
+    """Return the number of jumps of a column by `period`, give or take a usual step; 0 if it has other jumps, too."""
     column = column[np.isfinite(column)]
     steps = np.abs(np.diff(column))
     jumps = 2 * steps > period
@@ -227,9 +227,9 @@ def _jumps(column: FloatArray, period: int) -> int:
 
 
 def _is_apart(column: FloatArray, value: float, off: float) -> bool:
-    """Return whether a value lies apart from the samples around it; `off` is its distance in ranges of all others.
+    """Return True if a value is far from samples around it; `off`: distance from all others in units of their range.
 
-    Near their range, the samples before and after it must be alike: a contact at rest changes its level only once.
+    If it is near their range, the samples before and after it must be alike, unlike at a change of the contact.
     """
     column = column[np.isfinite(column)]
     at = column == value

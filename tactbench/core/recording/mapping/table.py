@@ -1,4 +1,4 @@
-"""A foreign table in memory, which knows for every row where it stands in its file; the reader of text files."""
+"""A foreign table in memory, with the place of every row in its file; the reader of text files."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9})\d*)?\s*
 _GROUPS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MARKS = ",.'’ \u00a0\u202f"
-"""Marks that separate decimals and thousands in the languages of the world."""
+"""Marks that separate decimals and groups of thousands in various languages."""
 Line = tuple[int, list[str]]
-"""The cells of a row, and its line in the file."""
+"""The number of a row's line in the file, and the row's cells."""
 Used = dict[Column, bool]
-"""The columns of a table that a mapping uses, and whether each holds readings: a float64 would round times."""
+"""The columns of a table that a mapping uses; True for readings, False for texts and times (not rounded to float64)."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows and columns of one recording: typed columns of an array, a bag or a Parquet file; :class:`TextTable`."""
+    """Rows and columns of one recording: typed columns of an array, a bag or a Parquet file, or texts."""
 
     shown: str
-    """Name of the file for messages, with the array or the topic that the table is in it."""
+    """Name of the file for messages, followed by the array or topic from which the table is read."""
     columns: tuple[Column, ...]
-    """Names of all columns, or their places where they have no names; of a bag, the fields that are used."""
+    """Names of all columns, or their places if they have no names; for a bag, only the used fields."""
     places: Sequence[int]
     """Place of each row in the file: its line, or its number from 0."""
     values: Mapping[Column, Sequence[Any]]
@@ -54,16 +54,16 @@ class Table:
         return len(self.places)
 
     def where(self, row: int | np.integer[Any]) -> str:
-        """Return the file of a row and its place in it, for messages."""
+        """Return the file of a row and the row's place in the file, for messages."""
         return f"{self.shown}{self.row}{self.places[int(row)]}"
 
     def take(self, rows: Sequence[int]) -> Table:
-        """Return the table of some of the rows."""
+        """Return a table of the rows with the given numbers, counted from 0."""
         values = {name: [column[row] for row in rows] for name, column in self.values.items()}
         return replace(self, values=values, places=[self.places[row] for row in rows])
 
     def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
+        """Return the values of a column as texts, one for each row, (n,)."""
         return [plain(value) for value in self._plain(column)]
 
     def numbers(self, column: Column) -> FloatArray:
@@ -75,7 +75,7 @@ class Table:
         return values
 
     def nanoseconds(self, time: Time) -> IntArray:
-        """Return the clock, (n,) whole nanoseconds, rounded once; raises MappingError for a cell without a time."""
+        """Return the times of the rows, (n,) [ns], rounded once; raises MappingError for a cell without a time."""
         per_unit, stamps = nanoseconds_per(time), np.empty(len(self), dtype=np.int64)
         for row, value in enumerate(self._stamps(time.column)):
             try:
@@ -99,21 +99,21 @@ class Table:
         return values.tolist() if isinstance(values, np.ndarray) else values
 
     def _stamps(self, column: Column) -> Iterable[Any]:
-        """Return a column as dates, or as numbers in the spelling of Python."""
+        """Return a column of times as texts of dates, or as numbers in Python's notation."""
         return self._plain(column)
 
     def _numbers(self, column: Column) -> FloatArray:
-        """Return a column, (n,), with infinity where there is neither a number nor a sign that it is missing."""
+        """Return a column, (n,), with NaN for no sample, and infinity for a cell that is not a number."""
         return np.asarray(self._column(column), dtype=np.float64)
 
     def _refusal(self, row: int, column: Column, wanted: str) -> MappingError:
-        """Return the error for a cell that holds no number, or no time."""
+        """Return the error for a cell that is not a number or time, as `wanted`."""
         text = f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}."
         return MappingError(text, hint=self._hint(row, column, wanted))
 
     def _hint(self, _row: int, _column: Column, wanted: str) -> str:
         if wanted == "number":
-            return "Leave the column out."
+            return "Leave the column out of the mapping."
         return (
             "Times are numbers, or dates like 2024-03-01T12:00:00.25+01:00. A row without a time cannot be kept; check "
             "column and unit, or write `clock: none`."
@@ -122,7 +122,7 @@ class Table:
 
 @dataclass(frozen=True)
 class TextTable(Table):
-    """Cells as they stand in a text file or a sheet, in columns by place and by names that stand once in the header."""
+    """Unconverted cells of a text file or a sheet, in columns by place, and by name if the header has it only once."""
 
     row: str = ":"
     how: Tabular = field(kw_only=True)
@@ -137,7 +137,7 @@ class TextTable(Table):
             raise MappingError(
                 f"{self.shown}: its header row has the number {name!r} in column {column}: that looks like a row of "
                 "data, which `header: true` would drop.",
-                hint="Write `header: false`; and `skiprows: 1` if that row is none of the data.",
+                hint="Write `header: false`; and `skiprows: 1` if that row is not data.",
             )
         return super()._column(column)
 
@@ -150,7 +150,7 @@ class TextTable(Table):
         return (text if ":" in text else self._as_python(text) for text in self._column(column))
 
     def _as_python(self, cell: str) -> str:
-        """Return a number as Python writes it; an empty text if the cell is written in another way than the table."""
+        """Return a number as Python writes it; an empty text if its marks are not those of the table."""
         decimal, thousands = self.how.decimal, self.how.thousands
         if decimal == "." and thousands is None:
             return cell
@@ -175,17 +175,17 @@ class TextTable(Table):
             return math.inf
 
     def _hint(self, row: int, column: Column, wanted: str) -> str:
-        """Return the next step, by the cause that the row or the spelling of the cell shows."""
+        """Return the next step for a cell that cannot be read, by its likely cause."""
         cell = self._column(column)[row]
         columns = [self.values[place] for place in range(len(self.columns))]
         if cell in self.columns:
-            return "The header stands here again: cut the file there, or remove the line if rows below it belong to it."
+            return "The header is repeated here: cut the file, or remove the line if the rows below belong to it."
         if mark := comment_mark(columns[0][row]):
             return f"This line is a comment: write `comment: {mark!r}` under `read`."
         if row == 0 and not any(math.isfinite(self._number(one[0])) for one in columns):
             return (
-                f"No cell of this row is one, as in a row of units: write `skiprows: [{self.places[0] - 1}]` under "
-                "`read` (lines count from 0), with those left out already."
+                f"No cell of this row is a number (units?): write `skiprows: [{self.places[0] - 1}]` under "
+                "`read` (lines count from 0), with the lines left out already."
             )
         marks = [mark for mark in _MARKS if mark in cell and mark != self.how.decimal]
         if marks and not cell.strip("+-0123456789eE" + _MARKS):
@@ -201,41 +201,41 @@ class TextTable(Table):
             odd = [text for text in one if math.isinf(self._number(text))]
             words |= dict.fromkeys(odd if one == self.values[column] or 2 * len(odd) < len(self) else ())
         likely = json.dumps([*words][:12], ensure_ascii=False)
-        return f"If all mean 'no sample', write `no_sample: {likely}` under `read`."
+        return f"If all of these mean 'no sample', write `no_sample: {likely}` under `read`."
 
 
 def no_column(shown: str, column: Column, columns: Sequence[Column]) -> MappingError:
     """Return the error for a column that a table with `columns` does not have, or has several times."""
     names = [name for name in columns if isinstance(name, str)]
     if isinstance(column, str) and (count := names.count(column)) > 1:
-        return MappingError(f"{shown} has {count} columns called {column!r}.", hint="Give its place.")
+        return MappingError(f"{shown} has {count} columns called {column!r}.", hint="Give the column's place instead.")
     near = did_you_mean(str(column), names)
     return MappingError(
         f"{shown} has no column {column!r}.",
-        hint=f"{near}It has {len(columns)}, with places from 0: {listed([*map(str, columns)], 'columns', 12)}.",
+        hint=f"{near}Its {len(columns)} columns, with places from 0: {listed([*map(str, columns)], 'columns', 12)}.",
     )
 
 
 def plain(value: Any) -> str:
-    """Return a number as people write it in a mapping: 1, not 1.0."""
+    """Return a value as text, whole numbers without decimals as in a mapping file: 1, not 1.0."""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
 def comment_mark(cell: str) -> str | None:
-    """Return the mark that a comment seems to begin with, if a line that begins with `cell` looks like one."""
+    """Return the mark, # or %, if a line that begins with `cell` seems to be a comment; else None."""
     return next((mark for mark in "#%" if cell.lstrip().startswith(mark)), None)
 
 
 def nanoseconds_per(time: Time) -> int:
-    """Return how many nanoseconds the unit of a clock has."""
+    """Return the length of a clock's unit of time [ns]."""
     return round(units.conversion(time.unit, "s") * 1e9)
 
 
 def _since_1970(date: re.Match[str], time: Time) -> int:
-    """Return the nanoseconds since 1970 of an ISO 8601 date; raises MappingError where it is not one moment."""
+    """Return the nanoseconds since 1970 of an ISO 8601 date; raises MappingError if it is ambiguous."""
     given, fraction, offset = date.groups()
     if time.epoch != "unix":
-        raise MappingError(f"{date[0]!r} is a date.", hint="Write `epoch: unix` under `time`.")
+        raise MappingError(f"{date[0]!r} is a date, not a number.", hint="Write `epoch: unix` under `time`.")
     when = datetime.fromisoformat(given + (offset or ""))
     if offset is None:
         if not time.zone:
@@ -246,14 +246,14 @@ def _since_1970(date: re.Match[str], time: Time) -> int:
         when = when.replace(tzinfo=ZoneInfo(time.zone))
         if when.utcoffset() != when.replace(fold=1).utcoffset():  # PEP 495: clocks are set back, or forward
             raise MappingError(
-                f"{date[0]!r} is no moment, or two, in {time.zone}, whose clocks are changed then.",
+                f"{date[0]!r} occurs twice, or never, in {time.zone}, whose clocks are changed then.",
                 hint="Give the times with their offset, 2023-10-29T02:30:00+01:00, or in UTC.",
             )
     return (when - _EPOCH) // timedelta(seconds=1) * 10**9 + int(f"{fraction or '':0<9}")
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
-    """Read a text file.
+    """Read a table from a text file.
 
     Raises
     ------
@@ -272,7 +272,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
     if "\0" in text:
         raise MappingError(
             f"{shown}:{text.count(chr(10), 0, text.index(chr(0))) + 1} has NUL bytes, as a power cut leaves them.",
-            hint="Remove the lines that have some; if all have, the file is UTF-16: `iconv -f UTF-16 -t UTF-8`.",
+            hint="Remove lines with NUL bytes; if all have some, the file is UTF-16: `iconv -f UTF-16 -t UTF-8`.",
         )
     # Not splitlines(): that also breaks at form feeds and Unicode separators, and line numbers would be wrong. Lines
     # that are left out stay as blank ones, so that the others keep their numbers.
@@ -289,7 +289,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
 
 
 def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
-    """Return the table of some lines, of which the first is the header if `how` says so."""
+    """Return the table made of lines of cells; the first line is the header if `how.header` is true."""
     header = tuple(cell.strip() for cell in lines.pop(0)[1]) if how.header and lines else ()
     if not lines:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skiprows`.")
@@ -320,12 +320,12 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
 
 
 def skipped(place: int, how: Tabular) -> bool:
-    """Return whether a line, counted from 0, is left out."""
+    """Return True if the line at `place`, counted from 0, is to be left out."""
     return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
 
 
 def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
-    """Yield the lines that are not blank, cut into cells."""
+    """Yield the number and the cells of each line that is not blank."""
     first = next((line for line in lines if line.strip()), "")
     if first.lower().startswith("sep="):
         hint = f"Write `skiprows: {lines.index(first) + 1}` under `read`, and `delimiter: {first[4:5]!r}`."
@@ -333,7 +333,7 @@ def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
     for mark in "\t;":
         if mark in first and how.delimiter not in first:
             raise MappingError(
-                f"{shown} is separated by {json.dumps(mark)}, and not by {how.delimiter!r}.",
+                f"Cells of {shown} are separated by {json.dumps(mark)}, not by {how.delimiter!r}.",
                 hint=f"Write `delimiter: {json.dumps(mark)}` under `read`.",
             )
     reader = csv.reader(lines, delimiter=how.delimiter, strict=True)
@@ -346,7 +346,7 @@ def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
 
 
 def _joined(lines: Sequence[Line], shown: str, how: Records) -> list[Line]:
-    """Return a row for the lines of each record; raises MappingError for a line of another length."""
+    """Return one row for the lines of each record; raises MappingError for a line with a wrong number of cells."""
     per_row = len(how.numbers_per_line)
     rows: list[Line] = []
     for place, (number, cells) in enumerate(lines):

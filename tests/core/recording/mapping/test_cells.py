@@ -74,7 +74,7 @@ def test_a_row_of_units_and_comments_are_left_out(tables):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("t,a,b,c,f\n0,1,2,3,4\nt,a,b,c,f\n1,1,2,3,5\n", ("press.csv:3", "header stands here again")),
+        ("t,a,b,c,f\n0,1,2,3,4\nt,a,b,c,f\n1,1,2,3,5\n", ("press.csv:3", "header is repeated here")),
         ("sep=;\nt;a;b;c;f\n0;1;2;3;4\n", ("'sep=;'", "skiprows: 1", "delimiter: ';'")),
         ("t,a,b,c,f\n0,1,OL,3,4\n1,1,5,-1.#IND,5\n2,1,5,6,5\n", ("press.csv:2: column 'b': 'OL'", '["OL", "-1.#IND"]')),
     ],
