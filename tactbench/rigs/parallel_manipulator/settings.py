@@ -1,6 +1,6 @@
 """Models of this rig's `settings:` in a rig file; a file without all limits is refused, so that nothing moves.
 
-Plain numbers, with the unit in a setting's name, converted to SI here. The motor's positions are positive into the skin.
+Plain numbers, with the unit in a setting's name, converted to SI here. Motor positions are positive into the skin.
 """
 
 from __future__ import annotations
