@@ -125,7 +125,7 @@ class ForceController:
         """
         _check_known(force_n, position, passed_s, setpoint_n, slope_n_s)
         if passed_s <= 0:
-            raise UsageError(f"The time since the last step of the force loop must be above 0 s: {passed_s}.")
+            raise UsageError(f"The time since the last step of the force loop is {passed_s} s; it must be above 0.")
         law = self.law
         kept = law.kept(passed_s)
         self.filtered_n = kept * self.filtered_n + (1 - kept) * force_n
