@@ -24,7 +24,7 @@ STOP_S = 10.0
 
 
 class Control:
-    """Loop that sends the steps of a press to a guard.
+    """Loop that advances a press in each control period and sends its commands to the guard.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Control:
         self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self.report = armed
-        """The last answer of the guard."""
+        """Last report received from the guard."""
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[float] = []
@@ -74,15 +74,15 @@ class Control:
         self._stop = ""
         self._thread: threading.Thread | None = None
         self.counts: Mapping[str, Mapping[str, int]] = {}
-        """Counts of guard, axes and force sensor in the last control period."""
+        """Event counts of guard, axes and force sensor, as of the last control period."""
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the blocks of force sensor and motor since the last call."""
+        """Yield the blocks of force sensor and motor received since the last call."""
         while self._blocks:
             yield self._blocks.popleft()
 
     def events(self) -> Iterator[Event]:
-        """Yield the events since the last call."""
+        """Yield the guard's events since the last call."""
         while self._events:
             yield self._events.popleft()
 
@@ -109,7 +109,7 @@ class Control:
                 self._over.wait(1e-9 * self._period_ns)
 
     def stop(self) -> None:
-        """End the thread, if there is one; the caller may use the guard afterwards."""
+        """End the control thread, if one runs; afterwards the caller may use the guard."""
         self._over.set()
         if self._thread is not None:
             self._thread.join(STOP_S)

@@ -19,12 +19,12 @@ from tactbench.links.link import Clock, Link
 
 @dataclass(frozen=True)
 class DriverSettings:
-    """Arguments of a driver."""
+    """Arguments with which a driver is made."""
 
     open_link: Callable[[], Link]
     """Function that opens the device's link, real or emulated."""
     streams: tuple[StreamSpec, ...] = ()
-    """Streams of the sensor's spec; empty for a device that is no sensor."""
+    """Streams of the sensor's spec; empty for a device other than a sensor."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Options of the device from the rig file; the driver refuses unknown options."""
     clock: Clock = time.monotonic_ns
@@ -38,7 +38,7 @@ class Options(BaseModel):
 
 
 class Driver(ABC):
-    """Driver of one device: open once it is made, until :meth:`close` or the end of its ``with`` block.
+    """Base class of drivers of one device: open from construction until :meth:`close` or the end of ``with``.
 
     A driver is used by one thread. It waits only in its link, so that it works in virtual time as in real time.
 

@@ -62,9 +62,9 @@ class EmulatorSettings:
 
 LINK_FAULTS = {
     "unplug": "the link is gone from start_s on",
-    "late": "what the device sends comes later by delay_s, in the same order",
+    "late": "data sent by the device arrive later by delay_s, in the same order",
 }
-"""Faults that every emulated device has, and their effects."""
+"""Names and effects of the faults available for every emulated device."""
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class ForceController:
     def step(
         self, force_n: float, position: float, passed_s: float, setpoint_n: float, slope_n_s: float = 0.0
     ) -> float:
-        """Return the next command, positive into the skin.
+        """Return the next commanded position, positive into the skin.
 
         Limits apply in this order: speed of the command, its distance from the measured position, the travel. While
         a limit acts, the integral does not grow in its direction. At a late sample command and integral stay.
@@ -167,7 +167,7 @@ class LoopModel:
     """Largest speed of the motor [length / s]; near its target the speed is limited by its braking."""
     acceleration: float = math.inf
     resolution_n: float = 0.0
-    """Step of the measured force [N]; 0: not rounded."""
+    """Resolution of the measured force [N]; 0: not rounded."""
 
     @classmethod
     def of(cls, loop: ForceLoop, period_s: float, **limits: Any) -> Self:

@@ -41,7 +41,7 @@ Problem = tuple[Trigger, str]
 
 
 class ForceWatch:
-    """Check of the samples of one force stream.
+    """Check of each sample in a stream of forces for values, losses and age.
 
     The age of a sample is the time since its receipt and, where the device has a clock of its own, its delay on the way
     beyond the least of the last second or two: a stream that is held up on its way is old although samples arrive. A
@@ -132,7 +132,7 @@ class ForceWatch:
         if problem is None and lost > limits.lost_samples:
             problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, limit {limits.lost_samples}"
         if problem is None and same >= limits.same_samples:
-            problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
+            problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are equal in every channel"
         if problem is not None:
             self._sound.clear()
         elif newer is not None and newer.t_ns is not None:
@@ -165,10 +165,10 @@ class ForceWatch:
         ceiling = limits.travel_ceiling_n if travelling else limits.force_ceiling_n
         if largest >= ceiling:
             trigger = Trigger.TRAVEL_CEILING if travelling else Trigger.FORCE_CEILING
-            return trigger, f"{largest:.3f} N, the ceiling is {ceiling:g} N"
+            return trigger, f"force {largest:.3f} N, ceiling {ceiling:g} N"
         torque = float(np.linalg.norm(wrenches[:, self._torques], axis=1).max())
         if limits.torque_ceiling_nm is not None and torque >= limits.torque_ceiling_nm:
-            return Trigger.TORQUE_CEILING, f"{torque:.4f} N m, the ceiling is {limits.torque_ceiling_nm:g} N m"
+            return Trigger.TORQUE_CEILING, f"torque {torque:.4f} N m, ceiling {limits.torque_ceiling_nm:g} N m"
         return None
 
     def _delayed(self, t_ns: int, device_ns: int) -> int:

@@ -478,7 +478,7 @@ class LocalGuard:
                 text = f"NOT KNOWN TO BE OUT: {where}: stand clear, and check what the indenter touches"
                 self._end(Trigger.NOT_CLEAR, text)
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
-            power = "left under power, since it may fall without"
+            power = "left under power, since it may fall without power"
             if press.facts.holds_unpowered:
                 with suppress(LinkError, RigError):
                     press.disable()

@@ -148,7 +148,7 @@ class Limits:
             and self.sign in (-1, 1)
         ):
             raise UsageError(
-                f"The guard's limits are not positive and finite, or contradict each other: {self}.",
+                f"Limits of the guard must be positive and finite, and must not contradict: {self}.",
                 hint="See docs/hardware.md, Safety.",
             )
 
@@ -165,9 +165,9 @@ class Beat:
     distance_m: float = 0.0
     """Length of a STEP from `Report.target_m`; rounded to the axis' resolution, so the rig adds remainders later."""
     position_m: float = math.nan
-    """Target of MOVE_TO."""
+    """Target position of MOVE_TO."""
     speed_m_s: float = math.nan
-    """Speed of MOVE_TO."""
+    """Speed of MOVE_TO [m/s]."""
     force_sequence: int = -1
     """`Report.force_sequence` of the force sample on which a step is based."""
     targets: Mapping[str, float] = field(default_factory=dict)

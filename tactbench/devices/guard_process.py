@@ -197,7 +197,7 @@ class GuardProcess:
         self._request("collect", self._timeout_s)
 
     def disarm(self) -> Report:
-        """Retreat if the pressing axis is not out, and expect no more beats."""
+        """Retreat if the pressing axis has not retreated, and expect no more beats."""
         report: Report = self._request("disarm", ARM_S)
         self._limits = None
         return report

@@ -362,7 +362,7 @@ class Positioner(Driver):
             self._asked_ns = None
             raise PositionerSilentError(
                 f"{self.device} does not answer {question!r}; the last line received is {self._came!r}.",
-                hint=f"Check the port, its baud rate, and that this is the controller that the driver is for. "
+                hint=f"Check the port, its baud rate, and that the driver is for this controller. "
                 f"{self.link.silence_hint}",
             )
         return lines
@@ -385,7 +385,7 @@ class Positioner(Driver):
         if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
             self._due_ns = self.clock() + round(1e9 * SETTLE_S)
             raise PositionerError(
-                f"It has not come {'home' if math.isinf(self._goal) else f'to {self._goal:g}'} in its time, and is at "
+                f"It has not reached {'its home' if math.isinf(self._goal) else f'{self._goal:g}'} in time, and is at "
                 f"{self.position:g}.",
                 hint="Check what is in its way, and that units and speed in the rig file are those of the controller.",
             )
@@ -421,7 +421,7 @@ class Positioner(Driver):
             )
 
     def check_move(self, position: float) -> None:
-        """Raise NotReadyError unless a move to a position may begin now."""
+        """Raise NotReadyError unless a move to a position [m] may begin now."""
         low, high = self.facts.limits
         for wrong, problem, hint in (
             (self.moving, "The axis is moving.", "Wait for the end of its move, or let it retreat."),
@@ -450,7 +450,7 @@ class Positioner(Driver):
         return math.nan if self.state is None else self.state.position
 
     def move_by(self, distance: float) -> float:
-        """Begin to move from the last target by a distance, to the nearest step; return the new target."""
+        """Begin a move by a distance [m] from the last target, to the nearest step; return the new target."""
         if self.state is None or math.isnan(self.state.target):
             raise NotReadyError("The axis' target is not known.", hint="Read its state once it is at rest.")
         return self.move_to(self.state.target + distance)

@@ -76,7 +76,7 @@ class PressPlan:
     found_m: float
     """Position below any possible surface, at which even the softest skin must have been touched."""
     speed_m_s: float
-    """Speed to `near_m`."""
+    """Speed of the approach down to `near_m`."""
     touch_speed_m_s: float
     """Speed from `near_m` until the touch."""
     unload_speed_m_s: float

@@ -156,7 +156,7 @@ class Reading:
                 driver.start()
                 for spec in driver.streams:
                     if spec.name in self._streams:
-                        hint = "Streams of one recording have different names."
+                        hint = "Rename one of these streams."
                         raise UsageError(
                             f"The stream {spec.name!r} of {name} of another device has the same name.", hint=hint
                         )

@@ -146,7 +146,7 @@ def open_driver(
     clock: Clock,
     link: Callable[[], Link] | None = None,
 ) -> Driver:
-    """Open one device; see :func:`drivers_of`. `link` opens the link of an emulated one."""
+    """Open one device, see :func:`drivers_of`; `link` is the function that opens an emulated device's link."""
     if descriptor.driver is None:
         raise UsageError(
             f"{descriptor.name} has no driver: it can be simulated or replayed, not read.",

@@ -80,7 +80,7 @@ class RowDriver(Driver, Generic[L]):
         """
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the rows received since the last call."""
+        """Return the rows received since the last call, in one block or none."""
         self.ask()
         times: list[int] = []
         found: list[Sample] = []
@@ -99,7 +99,7 @@ class RowDriver(Driver, Generic[L]):
         return [Block(self.stream.name, np.array(times, np.int64), data, quality if quality.any() else None)]
 
     def stop(self) -> None:
-        """Call :meth:`quiet`; raises nothing if the device is gone."""
+        """Stop the device by :meth:`quiet`; raises no error if the device is gone."""
         with suppress(LinkError):
             self.quiet()
 

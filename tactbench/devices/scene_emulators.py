@@ -67,7 +67,7 @@ class SceneEmulators(RigEmulators):
         self._samples = SceneSamples(streams, simulated, profile.duration.to("s"), rest_s=profile.hold_s)
 
     def begin(self, at_s: float) -> None:
-        """Let the scene begin."""
+        """Let the prepared scene begin."""
         if self._samples is not None:
             self._samples.start(at_s)
 
@@ -126,7 +126,7 @@ def serve(
 
 
 def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], control: str) -> RigFile:
-    """Return the rig file that opens emulated devices at their addresses."""
+    """Return a rig file with the addresses of the emulated devices' links."""
     plain, entries = file.model_dump(), file.entries()
     for name, address in addresses.items():
         part = plain if name == FORCE else plain["sensors" if name in file.sensors else "devices"]

@@ -58,7 +58,7 @@ class RecordingFolder(ReplayRig):
 
 
 def build(context: RigContext) -> RecordingFolder:
-    """Return the rig.
+    """Build the rig `replay`.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Clock
 
 READ_S = 0.25
-"""Longest wait of one read."""
+"""Longest wait of one read of a driver [s]."""
 RATE_TOLERANCE = 0.02
 """Relative difference from the stated rate that is reported. Assumed: quartz is a hundred times better, a timer of
 whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
@@ -33,7 +33,7 @@ _CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connecte
 
 @dataclass
 class DeviceCheck:
-    """Result of the check of one device."""
+    """Result of checking one device of a rig file."""
 
     name: str
     """Name of the device in messages."""

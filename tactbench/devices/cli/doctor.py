@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @format_option("table", "json")
 @click.pass_context
 def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str | None, shape: str) -> None:
-    """Check ports, permissions, buses, extras and the clock, and the devices of a rig.
+    """Check ports, permissions, buses, optional packages and clock of this machine, and the devices of a rig.
 
     Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
     printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be

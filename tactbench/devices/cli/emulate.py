@@ -22,7 +22,7 @@ HEAD = "# Written by `tactbench emulate`; these links exist only until that comm
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device with `link: emulated` in this rig file, with its faults.")  # fmt: skip
 def command(names: tuple[str, ...], rig_file: Path | None) -> None:
-    """Start emulated sensors and devices on links of this machine, until Ctrl-C.
+    """Start emulated sensors and devices on links of this machine; they run until Ctrl-C.
 
     DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. The rig file that
     opens them is printed: > rig.yaml. They are at rest until a recording with that file begins; then a

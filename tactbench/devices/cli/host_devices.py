@@ -27,7 +27,7 @@ class HostItem:
     """One resource of this machine that devices may need, and its state."""
 
     kind: str
-    """``serial port``, ``SPI``, ``CAN``, ``network``, ``extra`` or ``clock``."""
+    """Kind of resource: ``serial port``, ``SPI``, ``CAN``, ``network``, ``extra`` or ``clock``."""
     name: str
     state: Literal["works", "missing", "denied"]
     """``denied``: the resource exists, but this user may not open it."""

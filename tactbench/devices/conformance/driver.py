@@ -1,4 +1,4 @@
-"""Checks of the driver of a sensor or another device, on its emulator in virtual time: no line is opened."""
+"""Checks of a driver of a sensor or another device, run on its emulator in virtual time: no real link is opened."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Opened(NamedTuple):
     emulator: Any = None
 
     def channels(self) -> list[ChannelSpec]:
-        """Return the channels of all streams."""
+        """Return the channels of all streams of the driver."""
         return [channel for stream in self.driver.streams for channel in stream.channels]
 
     @property
@@ -326,7 +326,7 @@ def driver_decodes_the_manual(subject: Subject) -> None:
 
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_takes_any_pieces(subject: Subject) -> None:
-    """A serial port delivers half a frame or several at once, and cables lose bytes, which must not become a reading.
+    """A serial port may deliver parts of frames or several at once; frames with lost bytes must not become readings.
 
     Keep the rest of a frame for the next read, and take all whole frames. Check a frame's length, end or checksum, drop
     a damaged one and find the next beginning; count it in `counts` or mark it as SUSPECT.

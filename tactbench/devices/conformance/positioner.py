@@ -1,4 +1,4 @@
-"""Checks of an axis that moves, on its emulator in virtual time: the driver's position against the emulator's."""
+"""Checks of an axis' driver on its emulator in virtual time: the driver's position is compared with the emulator's."""
 
 from __future__ import annotations
 

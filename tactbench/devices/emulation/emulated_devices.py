@@ -30,7 +30,7 @@ work."""
 HELD = 8
 """Number of batches that an emulated SPI bridge stores, equal to that of the firmware in docs/links.md."""
 BAUD = 3_000_000
-"""Rate in the address of a serial line [bit/s]: above that of any device, since a pseudo-terminal has none."""
+"""Rate in the address of a serial line [bit/s]: above that of any device; pseudo-terminals have no rate."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class EmulatedDevice:
 
 
 class EmulatedDevices:
-    """Emulated devices that run until :meth:`close` or the end of the ``with`` block.
+    """Running emulated devices, until :meth:`close` or the end of the ``with`` block.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class EmulatedDevices:
         self._whole()
 
     def open_link(self, name: str) -> Link:
-        """Open the host's end of a device's link.
+        """Open the host's end of a device's link, for its driver.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class EmulatedDevices:
 
 
 def _far_end(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
-    """Return the far end of a line: an SPI device behind a bridge, in real time a CAN device behind an adapter."""
+    """Return the device's end of a link: an SPI device gets a bridge, in real time a CAN device gets an adapter."""
     emulator: Any = device.emulator
     if device.link == "spi":
         emulator = BridgeEmulator(emulator.exchange, holds=HELD)

@@ -15,8 +15,8 @@ Piece: TypeAlias = bytes | CanFrame
 """One transmitted piece of data: bytes of a stream, a CAN frame, or a datagram."""
 
 _AGAIN_S = 1e-6
-"""Assumed: two events of a device within this time are one. An emulator whose next event is due at the moment at which
-it was just polled, by rounding or by mistake, is polled again this much later, so that time always advances."""
+"""Time within which two events of a device count as one [s] (assumed). An emulator whose next event is due at the time of
+its last poll, by rounding or by mistake, is polled again this much later, so that time always advances."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
 
 
 class Line:
-    """Emulated device and its end of the link.
+    """Emulated device with the device's end of its link.
 
     Parameters
     ----------

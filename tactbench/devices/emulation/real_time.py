@@ -105,7 +105,7 @@ End = PseudoTerminal | UdpEnd
 
 
 class SlcanAdapter:
-    """CAN device behind a serial adapter of python-can's interface ``slcan``: a line of text for each data frame.
+    """Emulated serial adapter (python-can's interface ``slcan``) of a CAN device: a line of text for each data frame.
 
     The adapter's commands ``O`` and ``L`` open it, ``C`` closes it; other commands are ignored, and no command is
     answered [sourced: LAWICEL AB, CANUSB manual; python-can waits for no answer].

@@ -93,7 +93,7 @@ class _VirtualLink(Link):
 
     def _plugged(self) -> None:
         if self._line.gone:
-            raise self._unplugged(ConnectionError("unplugged, a fault of the emulated link"))
+            raise self._unplugged(ConnectionError("unplugged by a fault of the emulated link"))
 
     def _release(self) -> None:
         self._line.deliver = None

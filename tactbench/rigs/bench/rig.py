@@ -174,7 +174,7 @@ class Bench(Rig):
 
 
 def build(context: RigContext) -> Bench:
-    """Return the rig.
+    """Build the rig `bench`.
 
     Raises
     ------

@@ -57,7 +57,7 @@ WAY_POINT_M = 1e-3
 LEAST = 0.15
 """Least permitted s, sigma_U and sigma_W (assumed: joint speeds and errors grow at most 7 times)."""
 MODE = -1
-"""Sign of det(p - c1, p - c2, p - c3) of a machine whose carriages are ahead; kept along every permitted move."""
+"""Sign of det(p - c1, p - c2, p - c3) with carriages ahead of the platform; constant along every permitted move."""
 Length = Annotated[float, Field(gt=0, le=1e5)]
 Place = tuple[float, float, float]
 """Coordinates x, y, z of the manipulator's point [m]."""
@@ -89,7 +89,7 @@ class LinearDelta(Options):
     source: Source
     """Origin of these numbers: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
     azimuth_deg: PerLeg = (0.0, 120.0, 240.0)
-    """Direction of each leg about z."""
+    """Azimuth of each leg about z [deg]."""
     base_radius_mm: PositivePerLeg
     """Distance from the axis to the zero of each joint [mm]."""
     platform_radius_mm: PositivePerLeg
@@ -97,7 +97,7 @@ class LinearDelta(Options):
     link_mm: PositivePerLeg
     """Length of each link between its joints [mm]."""
     inclination_deg: PerLeg = (90.0, 90.0, 90.0)
-    """Angle of each rail above the horizontal, outwards; 90: vertical."""
+    """Angle of each rail above the horizontal, outwards [deg]; 90: vertical."""
     joint_lowest_mm: PerLeg
     """Least and greatest permitted position of each carriage [mm]."""
     joint_highest_mm: PerLeg
@@ -149,7 +149,7 @@ class LinearDelta(Options):
         return 1e-3 * np.array([self.joint_lowest_mm, self.joint_highest_mm])
 
     def centre_m(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 3 legs, 3) joint centres [m] of (..., 3) joint values."""
+        """Return the (..., 3 legs, 3) joint centres [m] for (..., 3) joint values [m]."""
         return self.anchor_m + q[..., None] * self.rail
 
 
@@ -235,7 +235,7 @@ def links(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
-    """Return the measures at places (..., 3) [m] with their joint values (..., 3)."""
+    """Return the distances from singularities at places (..., 3) [m] with joint values (..., 3) [m]."""
     unit = links(delta, p_m, q)
     across = np.cross(delta.sideways, unit)
     return Measures(

@@ -360,7 +360,7 @@ def _disarm(session: Session) -> None:
 
 
 def build(context: RigContext) -> ParallelManipulator:
-    """Return the rig.
+    """Build the rig `parallel-manipulator`.
 
     Raises
     ------

@@ -37,7 +37,7 @@ _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_un
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return the forces of axes and loop, and the problems for which the file is refused.
+    """Return tables of the largest forces of axes and force loop, and the problems for which the file is refused.
 
     Raises
     ------

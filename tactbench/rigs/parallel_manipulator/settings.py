@@ -59,7 +59,7 @@ class SafetyLimits(Options):
     rated_force_n: Positive
     """Largest load of the weakest part (skin, sensor, force sensor or cap) by its data sheet."""
     force_age_ms: Positive = 30.0
-    """Largest age of a sample of the force: three sampling periods of the force sensor, and the delays of sender and
+    """Largest age of a force sample: three sampling periods of the force sensor, and the delays of sender and
     host (assumed: 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
     """Least and greatest position of the motor; the 0 of a Faulhaber drive must lie in between."""
@@ -110,9 +110,9 @@ class ForceControl(Options):
     delay_ms: NotNegative
     """Delay from a force sample to the drive's receipt of the command: line time, answers, a control period's phase."""
     motor_lag_ms: NotNegative
-    """Time constant of the drive's position loop."""
+    """Lag of the motor: time constant of the drive's position loop."""
     speed_mm_s: Positive
-    """Largest speed of the loop: 2 to 5 times that of the ramp at the softest place."""
+    """Largest speed commanded by the loop: 2 to 5 times that of the ramp on the softest skin."""
     feed_forward_n_mm: Positive | None = None
     """Assumed stiffness for the ramp's feed-forward; null: no feed-forward."""
 
@@ -186,7 +186,7 @@ class Heights(Options):
     """
 
     surface_mm: float
-    """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
+    """Height of the manipulator at which the retracted indenter would touch; 0 for a fixed manipulator."""
     tolerance_mm: NotNegative
     """Largest distance of the surface from `surface_mm`: three times its spread, and differences of caps' lengths."""
     stand_off_mm: Positive

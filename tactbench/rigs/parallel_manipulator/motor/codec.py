@@ -25,7 +25,7 @@ UNKNOWN_COMMAND = "Unknown command"
 INVALID_PARAMETER = "Invalid parameter"
 NOT_AVAILABLE = "Command not available"
 OVERTEMPERATURE = "Overtemperature - drive disabled"
-"""The manual typesets a dash; two public drivers match the hyphen (sourced)."""
+"""Answer of a drive that is too hot. The manual typesets a dash; two public drivers match the hyphen (sourced)."""
 REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE)
 NOTICES = "pvrfhtwx"
 """Notices: position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4, 5.

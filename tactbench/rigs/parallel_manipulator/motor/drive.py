@@ -100,7 +100,7 @@ class Motion:
 
 
 class Drive:
-    """A drive and its motor.
+    """Model of a drive with its motor.
 
     Parameters
     ----------

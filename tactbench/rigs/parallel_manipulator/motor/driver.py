@@ -155,7 +155,7 @@ class FaulhaberDriver(Positioner):
         if abs(place_m - target_m) > CORRIDOR_M:
             self.disable()
             raise PositionerError(
-                f"The motor is at {place_m:g} m, its target at {target_m:g} m: its power was taken off again.",
+                f"The motor is at {place_m:g} m, its target at {target_m:g} m: its power was switched off again.",
                 hint="Home it anew.",
             )
 

@@ -30,7 +30,7 @@ RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", 
 """Structured dtype of a record, with the same fields as `_RECORD`, for arrays."""
 SEQUENCE_MODULUS = 1 << 32
 SENSOR_RATE_HZ = 7000
-"""The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
+"""Sampling rate [Hz]; the box sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
 public client)."""
 AXES = ("fx", "fy", "fz", "tx", "ty", "tz")
 STREAM = "force_torque"
@@ -60,7 +60,7 @@ class NetFtOptions(Options):
         return StreamSpec(name=STREAM, rate_hz=SENSOR_RATE_HZ / self.every, channels=tuple(channels))
 
     def wrench(self, counts: npt.ArrayLike) -> FloatArray:
-        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
+        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] for (…, 6) counts of a record."""
         wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors
         return wrench
 
@@ -92,7 +92,7 @@ def encode_request(command: Command, records: int = 0) -> bytes:
 
 
 def decode_request(data: bytes) -> tuple[Command, int]:
-    """Return command and number of records in a datagram; raises DatagramError if it is no request."""
+    """Return command and number of records in a datagram; raises DatagramError if it is not a request."""
     try:
         header, command, count = _REQUEST.unpack(data)
         if header == _HEADER:
@@ -103,7 +103,7 @@ def decode_request(data: bytes) -> tuple[Command, int]:
 
 
 def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Iterable[int]) -> bytes:
-    """Return the 36 bytes of a record: its number, the number of the sensor's sample, both modulo 2^32, six counts."""
+    """Return the 36 bytes of a record: record number and sample number, both modulo 2^32, status, and six counts."""
     return _RECORD.pack(rdt_sequence, ft_sequence, status, *counts)
 
 

@@ -99,12 +99,12 @@ class NetFtDriver(Driver):
             raise RigError(
                 f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected is every "
                 f"{self.options.every}th (rate_hz: {self.options.rate_hz:g}).",
-                hint=f"Set the RDT rate on its web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
+                hint=f"Set the RDT rate on the box's web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
             )
         return {"rate_hz": f"{SENSOR_RATE_HZ / every:.6g}", "status": f"{int(second['status']):08X}"}
 
     def start(self) -> None:
-        """Let the box send, and wait for the first datagram.
+        """Let the box send records, and wait for its first datagram.
 
         Raises
         ------
