@@ -63,7 +63,7 @@ class PositionerFacts:
     interruptible: bool
     """True if `halt` and `retreat` end a move under way; False if the controller completes every move."""
     holds_unpowered: bool
-    """True if it keeps its place without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    """True if the axis keeps its place unpowered: horizontal, or with brake, counterweight or self-locking screw."""
     homes_here: bool = False
     """True if homing takes the present place as home, even if the indenter is in the skin."""
     retreat: float = math.nan
@@ -175,7 +175,7 @@ class Positioner(Driver):
     resolution_m: ClassVar[float] = math.nan
     """Smallest step [m]."""
     stop_latency_s: ClassVar[float] = math.nan
-    """See :attr:`PositionerFacts.stop_latency_s`; the next is explained there, too."""
+    """Longest time until braking begins [s], and True if a halt ends a move under way: see :class:`PositionerFacts`."""
     interruptible: ClassVar[bool] = True
     stream = "motor"
 

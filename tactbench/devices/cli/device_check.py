@@ -23,7 +23,7 @@ from tactbench.links.link import Clock
 READ_S = 0.25
 """Longest wait of one read of a driver [s]."""
 RATE_TOLERANCE = 0.02
-"""Relative difference from the stated rate that is reported. Assumed: quartz is a hundred times better, a timer of
+"""Largest relative error of a right rate. Assumed: quartz is a hundred times better, a timer of
 whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
 HELD_S = 0.016
 """Longest time for which a usual USB serial adapter holds data back (default of FTDI's latency timer) [s]."""

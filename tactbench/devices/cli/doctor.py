@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Also check the forces which this rig file permits, then open and read its devices.")  # fmt: skip
 @click.option("--seconds", type=FiniteRange(min=0, max=600), default=3.0, show_default=True, metavar="T",
-              help="Time to read each device; 0 opens nothing.")  # fmt: skip
+              help="Time [s] to read each device; 0 opens no device.")  # fmt: skip
 @click.option("--jog", metavar="AXIS",
               help="Move one axis of the rig by small steps; the force is monitored and shown.")  # fmt: skip
 @format_option("table", "json")

@@ -44,8 +44,8 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
     """
     file = would.file if would else None
     if rig is None or file is None or would is None or file.force is None or name not in file.devices:
-        known = ", ".join(file.devices) if file and file.force else "no axis together with a force sensor"
-        raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Name an axis of --rig-file: {known}.")
+        known = ", ".join(file.devices) if file and file.force else "none with a force sensor"
+        raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Axes in --rig-file: {known}.")
 
     def ask(text: str) -> str:
         return str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True))

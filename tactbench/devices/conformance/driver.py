@@ -244,7 +244,7 @@ def _clock_is_right(where: str, stream: StreamData) -> None:
     most = int(np.argmax(steps))
     if steps[most] > CLOCK_STEP_S:
         text = f"rises by {device_s[most + 1] - device_s[most]:.4g} s in {host_s[most + 1] - host_s[most]:.4g} s"
-        fail(where, f"the clock {text}: unwrap its counter")
+        fail(where, f"the clock {text}: is its counter unwrapped?")
     if abs(rate - 1) > CLOCK_SHARE:
         fail(where, f"the clock counts {rate:.4g} s per second of the host: is it in nanoseconds?")
 

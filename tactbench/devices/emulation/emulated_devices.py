@@ -25,8 +25,8 @@ from tactbench.links.link import Clock, Link
 from tactbench.links.spi_bridge import SpiBridge
 
 SPI_HZ = 4_400_000
-"""Clock of an emulated SPI bus [Hz]: that of the BioTac maker's own tools [sourced: docs/links.md]; clocks up to 10 MHz
-work."""
+"""Clock of an emulated SPI bus [Hz]: that of the BioTac maker's own tools [sourced: docs/links.md]; the bus takes up
+to 10 MHz."""
 HELD = 8
 """Number of batches that an emulated SPI bridge stores, equal to that of the firmware in docs/links.md."""
 BAUD = 3_000_000

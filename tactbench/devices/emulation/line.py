@@ -15,8 +15,8 @@ Piece: TypeAlias = bytes | CanFrame
 """One transmitted piece of data: bytes of a stream, a CAN frame, or a datagram."""
 
 _AGAIN_S = 1e-6
-"""Time within which two events of a device count as one [s] (assumed). An emulator whose next event is due at the time of
-its last poll, by rounding or by mistake, is polled again this much later, so that time always advances."""
+"""Time within which two events of a device count as one [s] (assumed). An emulator whose next event is due at the
+time of its last poll, by rounding or by mistake, is polled again this much later, so that time always advances."""
 
 
 @dataclass(frozen=True)

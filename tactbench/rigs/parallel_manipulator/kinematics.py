@@ -282,7 +282,7 @@ def check_move(delta: LinearDelta, start_m: FloatArray, end_m: FloatArray) -> No
             place = ", ".join(f"{1e3 * x:.2f}" for x in places[np.argmax(left < 0)])
             raise PlaceRefusedError(
                 f"({place}) mm is not permitted: {name} beyond its limit.",
-                hint="Nothing was moved. Choose another place or another path.",
+                hint="Nothing has moved. Choose another place or another path.",
             )
 
 

@@ -222,7 +222,7 @@ def _forces(
             f"{1e3 * motor.stop_latency_s:.1f} ms of motor and line",
         ),
         ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
-        ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
+        ("in an approach with an undetected touch", f"{by_approach:.2f} N: ceiling and reaction"),
         (
             "if the force sensor stops responding",
             f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's; detected after {1e3 * way_m:.2f} mm",

@@ -227,7 +227,7 @@ class FaulhaberDriver(Positioner):
 
     def _check_limits(self) -> None:
         if not self._has(Configuration.POSITION_LIMITS):
-            raise PositionerError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
+            raise PositionerError("The motor's drive has lost its ends of travel.", hint="Home it anew.")
 
     def _against_stop(self, stop: Callable[[], bool]) -> None:
         """Run at the homing speed and current until the motor stands at its current limit in two successive polls."""
