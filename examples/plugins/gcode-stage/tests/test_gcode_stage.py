@@ -75,7 +75,7 @@ def test_homing_is_ended_by_a_stop_and_has_a_deadline(stage):
         stage.home(lambda: True)
     assert not stage.homed
     stage.emulator.deaf_to = b"H"
-    with pytest.raises(PositionerError, match="error:5|not come home"):
+    with pytest.raises(PositionerError, match="error:5|not reached its home"):
         stage.home()
     assert not stage.homed
 
