@@ -1,1 +1,1 @@
-"""Devices on links: what a driver and an emulator are, reading several at once, and emulators behind links."""
+"""Devices on links: base classes of drivers and emulators, reading of several devices at once, emulated links."""

@@ -1,4 +1,4 @@
-"""The control loop of a press: it sends a beat to the guard each period, in virtual time or in a thread of its own.
+"""The control loop of a press: a beat (sign of life) to the guard each period, in virtual time or in a thread.
 
 Each beat carries a step of the press, so the guard retreats if the controller hangs.
 """
@@ -20,30 +20,30 @@ from tactbench.devices.press import Press
 from tactbench.links.link import Clock
 
 STOP_S = 10.0
-"""Timeout for the end of the thread (assumed: a control period, and an answer of a guard in another process)."""
+"""Timeout for the end of the control thread [s] (assumed: a control period and an answer of the guard's process)."""
 
 
 class Control:
-    """Loop that sends the steps of a press to a guard.
+    """Loop that advances a press in each control period and sends its commands to the guard.
 
     Parameters
     ----------
     guard
-        A guard that is armed right before :meth:`carry` or :meth:`start` is called.
+        Guard of the axes, to be armed right before :meth:`carry` or :meth:`start`.
     limits
-        Its limits.
+        Limits with which the guard was armed.
     armed
-        Its answer to `arm`.
+        Report that the guard returned when armed.
     press
-        The press.
+        Press to carry out.
     received
-        Returns the number of rows of the sensor so far.
+        Function that returns the number of rows received from the sensor so far.
     clock
-        The rig's clock.
+        The rig's clock [ns].
     period_s
-        Control period.
+        Control period [s].
     stale_s
-        Longest time without a new row of the sensor.
+        Longest permitted time without a new row of the sensor [s].
     """
 
     def __init__(
@@ -60,11 +60,11 @@ class Control:
     ) -> None:
         self.press = press
         self.late = 0
-        """Control periods that began more than one period late."""
+        """Number of control periods that began more than one period late."""
         self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self.report = armed
-        """The last answer of the guard."""
+        """Last report received from the guard."""
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[float] = []
@@ -74,32 +74,32 @@ class Control:
         self._stop = ""
         self._thread: threading.Thread | None = None
         self.counts: Mapping[str, Mapping[str, int]] = {}
-        """Counts of guard, axes and force sensor in the last control period."""
+        """Event counts of guard, axes and force sensor, as of the last control period."""
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the blocks of force sensor and motor since the last call."""
+        """Yield the blocks of force sensor and motor received since the last call."""
         while self._blocks:
             yield self._blocks.popleft()
 
     def events(self) -> Iterator[Event]:
-        """Yield the events since the last call."""
+        """Yield the guard's events since the last call."""
         while self._events:
             yield self._events.popleft()
 
     def carry(self, until_ns: int) -> None:
-        """Advance to a nanosecond of the clock, with a beat whenever one is due: for virtual time."""
+        """Advance virtual time to `until_ns` of the clock, sending a beat in each control period."""
         while self._next_ns <= until_ns:
             self._guard.advance(self._next_ns)
             self._period()
         self._guard.advance(until_ns)
 
     def start(self) -> None:
-        """Send beats from a thread of its own, until :meth:`stop`: for real time."""
+        """Send beats in real time from a separate thread, until :meth:`stop`."""
         self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
         self._thread.start()
 
     def retreat(self, why: str, within_s: float) -> None:
-        """Let the motor retreat from the next control period on; return at the end of the retreat or of the time."""
+        """Let the motor retreat from the next control period on; return when the retreat has ended or time is over."""
         self._stop = self._stop or why
         until_ns = self._clock() + round(1e9 * within_s)
         while not self.press.over and self._clock() < until_ns:
@@ -109,7 +109,7 @@ class Control:
                 self._over.wait(1e-9 * self._period_ns)
 
     def stop(self) -> None:
-        """End the thread, if there is one; the caller may use the guard afterwards."""
+        """End the control thread, if one runs; afterwards the caller may use the guard."""
         self._over.set()
         if self._thread is not None:
             self._thread.join(STOP_S)
@@ -146,7 +146,7 @@ class Control:
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
         press = self.press
         if 1e-9 * late_ns > self._limits.heartbeat_s:
-            press.fail(f"the program stood still for {1e-9 * late_ns:.1f} s")
+            press.fail(f"the control program was held up for {1e-9 * late_ns:.1f} s")
         if late_ns > self._period_ns:  # the last report is outdated
             self.report = self._guard.beat(Beat(now_ns, str(press.state)))
         self._gather()
@@ -154,7 +154,7 @@ class Control:
         if self._stop:
             press.fail(self._stop)
         if now_ns - self._rows_ns > self._stale_ns:
-            press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
+            press.fail(f"no row of the sensor has come for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
         try:
             beat = press.step(self.report, raw, 1e-9 * now_ns)
         except TactbenchError as error:

@@ -1,4 +1,4 @@
-"""Driver of one device behind one link, which is read in blocks; and its options."""
+"""Base class of drivers: one device on one link, read in blocks of rows; and models of a device's options."""
 
 from __future__ import annotations
 
@@ -19,63 +19,63 @@ from tactbench.links.link import Clock, Link
 
 @dataclass(frozen=True)
 class DriverSettings:
-    """Arguments of a driver."""
+    """Arguments with which a driver is made."""
 
     open_link: Callable[[], Link]
-    """Function that opens the link of the rig file, or of the emulator."""
+    """Function that opens the device's link, real or emulated."""
     streams: tuple[StreamSpec, ...] = ()
-    """Streams of the sensor's spec; empty for a device that is no sensor."""
+    """Streams of the sensor's spec; empty for a device other than a sensor."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Options of the device in the rig file; the driver refuses unknown ones."""
+    """Options of the device from the rig file; the driver refuses unknown options."""
     clock: Clock = time.monotonic_ns
-    """The host's clock, the same as the link's; virtual where time is virtual."""
+    """Clock of the host [ns], also used by the link; virtual in virtual time."""
 
 
 class Options(BaseModel):
-    """Model of the options of a device, for its driver and its emulator, or of a rig's settings: known, finite ones."""
+    """Base model of device options or rig settings: unknown names and numbers that are not finite are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Driver(ABC):
-    """Driver of one device: open once it is made, until :meth:`close` or the end of its ``with`` block.
+    """Base class of drivers of one device: open from construction until :meth:`close` or the end of ``with``.
 
-    One thread uses a driver. It waits in its link alone, so that it runs in virtual time as in real time.
+    A driver is used by one thread. It waits only in its link, so that it works in virtual time as in real time.
 
-    Bad samples raise nothing: they are marked in the blocks' quality and counted in :attr:`counts`. An error ends the
+    Bad samples raise no error: they are marked in the blocks' quality and counted in :attr:`counts`. An error ends the
     reading: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
 
     Raises
     ------
     UsageError
-        If options are not known or contradict each other, or the link is of another kind.
+        If options are unknown or contradict each other, or the link is of the wrong kind.
     LinkError
         If the link does not open.
     """
 
     device: ClassVar[str] = ""
-    """Name in messages; empty: the name of the class."""
+    """Name of the device in messages; empty: the name of the class."""
     link_kind: ClassVar[type[Link]]
-    """Kind of its link; and an example of its address."""
-    address: ClassVar[str] = "those of docs/links.md"
+    """Kind of link that the driver needs, and an example of a link address."""
+    address: ClassVar[str] = "an address of docs/links.md"
     options_kind: ClassVar[type[Options]] = Options
-    """Model of the options in a rig file's entry."""
+    """Model of the device's options in the rig file."""
 
     def __init__(self, settings: DriverSettings) -> None:
         device = self.device or type(self).__name__
         self.clock = settings.clock
-        """Nanoseconds of the host."""
+        """Clock of the host [ns]."""
         self.options: Any = read_options(self.options_kind, settings.options, device)
         self.link: Any = open_for(settings, device, self.link_kind, self.address)
 
     @property
     @abstractmethod
     def streams(self) -> tuple[StreamSpec, ...]:
-        """Streams that it reads, as it is set up now; rates as far as they are known."""
+        """Streams that the driver reads in its present set-up; rates [Hz] as far as they are known."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts since it was opened, by name: parity errors, frames lost, and others."""
+        """Event counts since the driver was opened, by name: parity errors, lost frames, and others."""
         return {}
 
     def identify(self) -> Mapping[str, str]:
@@ -84,13 +84,13 @@ class Driver(ABC):
         Raises
         ------
         LinkTimeout, LinkUnplugged, RigError
-            If it does not answer, or is another device.
+            If the device does not answer, or is another device.
         """
         return {}
 
     @abstractmethod
     def start(self) -> None:
-        """Set the device up and let it sample; raises as :meth:`identify`.
+        """Set the device up and let it sample; raises the errors of :meth:`identify`.
 
         Data from before are discarded (:meth:`~tactbench.links.link.Link.discard`): the first row is of the first
         whole frame after this call.
@@ -98,7 +98,7 @@ class Driver(ABC):
 
     @abstractmethod
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the rows received since the last call, a block for each stream that has any.
+        """Return the rows received since the last call, one block for each stream with new rows.
 
         Parameters
         ----------
@@ -114,10 +114,10 @@ class Driver(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Let the device stop sampling, and drop data under way. Raises nothing if the device is gone."""
+        """Let the device stop sampling, and drop data under way. Raises no error if the device is gone."""
 
     def close(self) -> None:
-        """Stop if it is sampling, and close the link; a second call does nothing."""
+        """Stop a device that is sampling, and close the link; a second call does nothing."""
         self.stop()
         self.link.close()
 
@@ -129,7 +129,7 @@ class Driver(ABC):
 
 
 def fault_text(error: Exception) -> str:
-    """Return the message of an error for use in a sentence: without hint and full stop."""
+    """Return the message of an error for use inside a sentence: without its hint and final full stop."""
     return (error.message if isinstance(error, TactbenchError) else error_text(error)).rstrip(".")
 
 
@@ -137,9 +137,9 @@ _Link = TypeVar("_Link", bound=Link)
 
 
 def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:
-    """Return the open link of a driver; raises UsageError if it is of another kind, LinkError if it does not open."""
+    """Return the open link of a driver; raises UsageError for a wrong kind of link, LinkError if it does not open."""
     link = settings.open_link()
     if not isinstance(link, kind):
         link.close()
-        raise UsageError(f"{device} has another kind of link than {link.address}.", hint=f"Use one like {example}.")
+        raise UsageError(f"{device} cannot use the kind of link {link.address}.", hint=f"Use a link like {example}.")
     return link

@@ -1,4 +1,4 @@
-"""Emulators: models of devices at the far end of a link, without input or output of their own."""
+"""Base classes of emulators: models of devices behind a link, without real input or output."""
 
 from __future__ import annotations
 
@@ -18,85 +18,85 @@ if TYPE_CHECKING:
     import numpy as np
 
 Senses: TypeAlias = Callable[[float], Mapping[str, float]]
-"""Function from a second to the readings of the device's channels by name, in their units; the others are at rest."""
+"""Function from a time [s] to the sensed values by channel, in the channels' units; channels left out are at rest."""
 
 Sent: TypeAlias = tuple[float, "bytes | CanFrame"]
-"""Second at which a piece has left the device, and the piece: bytes of a stream, a CAN frame, a datagram."""
+"""Time at which data have left the device [s], and the data: bytes of a stream, a CAN frame or a datagram."""
 
 
 class DeviceEmulator(Protocol):
-    """Device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back.
+    """Emulated device on a byte stream, CAN bus or datagram link. Times are seconds of one clock that never goes back.
 
-    The times of a serial line's bytes are those at which the line has carried them.
+    On a serial line, the time of a byte is the time at which its transmission has ended.
     """
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take a piece from the host; return as :meth:`poll`."""
+        """Process data from the host; return the same as :meth:`poll`."""
 
     def poll(self, now_s: float) -> Sequence[Sent]:
-        """Return the pieces that have left the device since the last call until `now_s`, in order of their times."""
+        """Return the data that have left the device between the last call and `now_s`, in order of time."""
 
     def next_s(self) -> float:
-        """Return the second of the next event; infinite: none before a piece comes. Only calls change it."""
+        """Return the time of the next event [s]; infinite: no event until the host sends data. Only calls change it."""
 
 
 class SpiDeviceEmulator(Protocol):
-    """Device on an SPI bus: it sends only while the host clocks bytes."""
+    """Emulated device on an SPI bus, which sends only while the host clocks bytes."""
 
     def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
-        """Return as many bytes as go in; `select` is the mask of select lines, `now_s` the second of the first byte."""
+        """Return as many bytes as `data` has; `select` is the mask of select lines, `now_s` the first byte's time."""
 
 
 @dataclass(frozen=True)
 class EmulatorSettings:
-    """Arguments of an emulator."""
+    """Arguments with which an emulator is made."""
 
     senses: Senses
     rng: np.random.Generator
-    """Generator of this device alone."""
+    """Random generator used by this device alone."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Options of the rig file's entry, which the driver gets as well: board numbers, periods, rates."""
+    """Options of the device from the rig file, also given to the driver: board numbers, periods, rates."""
     faults: Sequence[str] = ()
-    """Faults, as :meth:`~tactbench.devices.emulator.Fault.parse` reads them."""
+    """Faults as text, in the format of :meth:`~tactbench.devices.emulator.Fault.parse`."""
 
 
 LINK_FAULTS = {
     "unplug": "the link is gone from start_s on",
-    "late": "what the device sends comes later by delay_s, in the same order",
+    "late": "data sent by the device arrive later by delay_s, in the same order",
 }
-"""Faults that every emulated device has, and their effects."""
+"""Names and effects of the faults available for every emulated device."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Fault from `start_s` until before `end_s`, seconds of the emulator's clock.
+    """Fault of an emulated device, active from `start_s` until just before `end_s` on the emulator's clock [s].
 
-    A device's own faults are a frozen subclass with :attr:`known`, and further fields for their details.
+    The faults of one device are a frozen subclass with its :attr:`known`, and more fields for details.
 
     Raises
     ------
     UsageError
-        If the device has no fault of that name, or `every` is below 1.
+        If the device has no fault of this name, or `every` is below 1.
     """
 
     known: ClassVar[Mapping[str, str]] = {}
-    """Names of a device's faults, and their effects."""
+    """Names of the device's faults, with a description of their effects."""
 
     name: str
     start_s: float = -math.inf
     end_s: float = math.inf
     every: int = 1
-    """The fault concerns each n-th word, frame, line or datagram that it could concern."""
+    """The fault affects only each n-th word, frame, line or datagram that it can affect."""
 
     def __post_init__(self) -> None:
         if self.name not in self.known:
             raise UnknownNameError("fault", self.name, {*self.known, *LINK_FAULTS})
         if self.every < 1:
-            raise UsageError(f"The fault {self.name!r} cannot concern every {self.every}.", hint="Give 1 or more.")
+            raise UsageError(f"`every` of the fault {self.name!r} is {self.every}.", hint="Give 1 or more.")
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the fault that ``name`` or ``name:key=value,key=value`` describes, as a rig file writes it.
+        """Return the fault described by ``name`` or ``name:key=value,key=value``, the format of rig files.
 
         Keys are the fields of the class, values are numbers or text; several values of one key are joined by ``+``.
 
@@ -121,28 +121,28 @@ class Fault:
             raise UsageError(f"The fault {text!r} is wrong: {error.errors()[0]['msg']}.") from error
 
     def active(self, now_s: float) -> bool:
-        """Return whether it is on."""
+        """Return True if the fault is active at `now_s`."""
         return self.start_s <= now_s < self.end_s
 
 
 def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:
-    """Return whether a fault `name` concerns the next word, line or datagram; `seen` counts the possible ones."""
+    """Return True if a fault `name` affects the next word, line or datagram; `seen` counts those it can affect."""
     concerned = [fault for fault in faults if fault.name == name and fault.active(now_s)]
     seen.update(concerned)
     return any(seen[fault] % fault.every == 0 for fault in concerned)
 
 
 class RowEmulator(ABC):
-    """Emulator of the device of a :class:`~tactbench.devices.row_driver.RowDriver`, without faults of its own."""
+    """Emulator of a device read by a :class:`~tactbench.devices.row_driver.RowDriver`; it has link faults only."""
 
     stream: ClassVar[StreamSpec]
-    """Stream that it senses."""
+    """Stream of the values that the device senses."""
     rate_hz: ClassVar[float] = 0.0
-    """Rows a second while it samples; 0: it sends answers alone."""
+    """Rows sent per second while sampling [Hz]; 0: the device only sends answers to requests."""
     from_power_on: ClassVar[bool] = False
-    """Whether it samples without a command."""
+    """True if the device samples from power-on, without a command."""
     answer_s: ClassVar[float] = 1e-3
-    """Seconds that an answer takes; above 0, or virtual time would stand still while a host polls."""
+    """Delay of an answer [s]; above 0, since virtual time would not advance while a host polls."""
 
     def __init__(self, settings: EmulatorSettings) -> None:
         for fault in settings.faults:
@@ -154,29 +154,29 @@ class RowEmulator(ABC):
 
     @abstractmethod
     def sent(self, values: Sequence[float]) -> Iterable[bytes | CanFrame]:
-        """Return a row as it leaves the device: bytes, datagrams or CAN frames."""
+        """Return one row as data sent by the device: bytes, datagrams or CAN frames."""
 
     def told(self, piece: bytes | CanFrame, now_s: float) -> Iterable[bytes | CanFrame]:
-        """Return the answer to a piece from the host; :meth:`sample` may be called here."""
+        """Return the answer to data from the host; a command may start or stop sampling by :meth:`sample`."""
         return ()
 
     def sample(self, now_s: float, on: bool = True) -> None:
-        """Begin to sample now, or end."""
+        """Begin sampling now, or end sampling."""
         self._since_s, self._rows = (now_s if on else math.inf), 0
 
     def sensed(self, now_s: float) -> list[float]:
-        """Return the readings of the channels; those that are not sensed are at their rest level."""
+        """Return the channels' values at a time [s]; channels without a sensed value are at their rest level."""
         felt = self.settings.senses(now_s)
         return [felt.get(one.name, 0.0 if one.rest is None else one.rest.to(one.unit)) for one in self.stream.channels]
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take a piece from the host; the answers are sent `answer_s` later."""
+        """Process data from the host; the answers are sent `answer_s` later."""
         before = self.poll(now_s)
         self._answers.extend((now_s + self.answer_s, answer) for answer in self.told(piece, now_s))
         return before
 
     def poll(self, now_s: float) -> Sequence[Sent]:
-        """Return the rows that are due."""
+        """Return the rows and answers sent until `now_s`."""
         found: list[Sent] = []
         while (due_s := self.next_s()) <= now_s:
             if self._answers and self._answers[0][0] <= due_s:
@@ -187,6 +187,6 @@ class RowEmulator(ABC):
         return found
 
     def next_s(self) -> float:
-        """Return when the next row or answer is due."""
+        """Return the time at which the next row or answer is due [s]."""
         row_s = self._since_s + (self._rows + 1) / self.rate_hz if self.rate_hz else math.inf
         return min(row_s, self._answers[0][0]) if self._answers else row_s

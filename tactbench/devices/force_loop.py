@@ -1,4 +1,4 @@
-"""The force loop: one control law, a model of motor and skin around it, and the gains that settle.
+"""The force loop: a control law, a model of motor and skin, and a test of which gains are stable.
 
 One step of length T, position positive into the skin, measured force m, filter y, integral i, command c:
 
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from tactbench.core.spec.drive import ForceLoop
 
 LATE = 1.5
-"""Periods after which a sample is late: half a period more than one."""
+"""Number of control periods after which a force sample counts as late."""
 
 
 @dataclass(frozen=True)
 class ForceLaw:
-    """The control law, with its limits.
+    """Numbers of the control law for the force: gains, filter and limits.
 
     Raises
     ------
@@ -44,21 +44,21 @@ class ForceLaw:
     """
 
     period_s: float
-    """T."""
+    """Control period T [s]."""
     proportional: float
-    """kp [length / N]."""
+    """Proportional gain kp [length / N]."""
     integral: float
-    """ki [length / (N s)]."""
+    """Integral gain ki [length / (N s)]."""
     cutoff_hz: float | None = None
-    """f of the filter; None: unfiltered."""
+    """Cut-off frequency f of the force filter [Hz]; None: unfiltered."""
     speed: float = math.inf
     """Largest speed of the command [length / s]."""
     windup_s: float = math.inf
-    """Time whose way at `speed` is the largest distance of the command from the measured position."""
+    """Largest distance of command and measured position, as the time that a move at `speed` needs for it [s]."""
     travel: tuple[float, float] = (-math.inf, math.inf)
-    """Least and greatest command."""
+    """Least and greatest commanded position [length]."""
     feed_forward: float = math.inf
-    """k [N / length]; infinite: no feed-forward."""
+    """Stiffness k of the feed-forward [N / length]; infinite: no feed-forward."""
 
     def __post_init__(self) -> None:
         gains = (self.proportional, self.integral)
@@ -68,29 +68,29 @@ class ForceLaw:
             and all(value > 0 for value in positive)
             and self.travel[0] < self.travel[1]
         ):
-            raise UsageError(f"The force loop cannot be stepped: {self}.", hint="Correct its numbers.")
+            raise UsageError(f"The force loop has a negative gain, no gain or wrong limit: {self}.", hint="Correct it.")
 
     def kept(self, passed_s: float) -> float:
-        """Return a, the share of its past that the filter keeps after a time."""
+        """Return a, the part (0 to 1) of its last value that the filter keeps after a time."""
         return 0.0 if self.cutoff_hz is None else math.exp(-2 * math.pi * self.cutoff_hz * passed_s)
 
 
 class ForceController:
-    """The memory of the law: filter, integral and command; a new one for each press.
+    """State of the control law during one press: filtered force, integral and command.
 
     Parameters
     ----------
     law
-        Gains and limits.
+        Gains and limits of the control law.
     force_n, position
-        Raw force and measured position at the beginning, from which it starts without a jump.
+        Raw force [N] and measured position at the beginning, from which the command starts without a jump.
 
     Attributes
     ----------
     filtered_n
         The filtered force [N].
     target
-        The position commanded last.
+        Position that was commanded last.
     """
 
     def __init__(self, law: ForceLaw, force_n: float, position: float) -> None:
@@ -102,19 +102,19 @@ class ForceController:
     def step(
         self, force_n: float, position: float, passed_s: float, setpoint_n: float, slope_n_s: float = 0.0
     ) -> float:
-        """Return the next command, positive into the skin.
+        """Return the next commanded position, positive into the skin.
 
-        The command's speed is limited, then its distance from the measured position, then its travel. While a limit
-        acts, the integral does not grow in its direction. A late sample moves and integrates nothing.
+        Limits apply in this order: speed of the command, its distance from the measured position, the travel. While
+        a limit acts, the integral does not grow in its direction. At a late sample command and integral stay.
 
         Parameters
         ----------
         force_n, position
-            Raw force, positive when pressing, and measured position.
+            Raw force [N], positive when pressing, and measured position.
         passed_s
-            Time since the step before.
+            Time since the step before [s].
         setpoint_n, slope_n_s
-            Wanted force and its slope, for the feed-forward.
+            Wanted force [N], and its slope [N/s] for the feed-forward.
 
         Raises
         ------
@@ -125,7 +125,7 @@ class ForceController:
         """
         _check_known(force_n, position, passed_s, setpoint_n, slope_n_s)
         if passed_s <= 0:
-            raise UsageError(f"The force loop was stepped {passed_s} s after the step before.")
+            raise UsageError(f"The time since the last step of the force loop is {passed_s} s; it must be above 0.")
         law = self.law
         kept = law.kept(passed_s)
         self.filtered_n = kept * self.filtered_n + (1 - kept) * force_n
@@ -150,30 +150,30 @@ class ForceController:
 def _check_known(*numbers: float) -> None:
     if not all(map(math.isfinite, numbers)):
         raise RigError(
-            f"Force, position or time is not a number: {numbers}.",
-            hint="An unknown force counts as too large a force: retreat.",
+            f"Force, position or time is not a finite number: {numbers}.",
+            hint="Retreat: an unknown force counts as too large.",
         )
 
 
 @dataclass(frozen=True)
 class LoopModel:
-    """A force law around a motor that presses: its simulation, and the matrix of one step on a linear skin."""
+    """Model of a motor that presses under a force law: simulation, and matrix of one step on a linear skin."""
 
     law: ForceLaw
     lag_kept: float
-    """b, the share of its way that the motor has left after one step; 0: no lag."""
+    """b, the part (0 to 1) of a commanded way that remains after one step; 0: no lag."""
     delay_steps: int
     speed: float = math.inf
-    """The motor's largest speed [length / s]; at a distance it is limited to what the motor can brake."""
+    """Largest speed of the motor [length / s]; near its target the speed is limited by its braking."""
     acceleration: float = math.inf
     resolution_n: float = 0.0
-    """Step of the measured force [N]; 0: not rounded."""
+    """Resolution of the measured force [N]; 0: not rounded."""
 
     @classmethod
     def of(cls, loop: ForceLoop, period_s: float, **limits: Any) -> Self:
-        """Return the model of a declared loop, lengths in mm, stepped with a period.
+        """Return the model of a force loop as declared in a scene or spec, with lengths in mm and a control period [s].
 
-        `limits` are `speed`, `windup_s`, `travel` and `feed_forward` of the law.
+        `limits` may set `speed`, `windup_s`, `travel` and `feed_forward` of the control law.
         """
         law = ForceLaw(
             period_s=period_s,
@@ -193,7 +193,7 @@ class LoopModel:
 
     @classmethod
     def around(cls, law: ForceLaw, *, lag_s: float, delay_s: float, **motor: float) -> Self:
-        """Return the model of a law with the motor's lag and the delay of a command; `motor` as the fields."""
+        """Return the model of a law with a motor's lag [s] and a command's delay [s]; `motor` sets other fields."""
         return cls(
             law,
             lag_kept=math.exp(-law.period_s / lag_s) if lag_s > 0 else 0.0,
@@ -203,9 +203,9 @@ class LoopModel:
         )
 
     def matrix(self, stiffness: float) -> FloatArray:
-        """Return the matrix of one step of (x, y, i, c_{n-1} ... c_{n-d}) on a linear skin, without limits, rounding.
+        """Return the matrix of one step of (x, y, i, c_{n-1} ... c_{n-d}) on a linear skin, without limits or rounding.
 
-        The loop settles if and only if all its eigenvalues lie inside the unit circle.
+        The loop is stable if and only if all eigenvalues of the matrix lie inside the unit circle.
         """
         law, kept = self.law, self.law.kept(self.law.period_s)
         x, y, integral, *late = np.eye(3 + self.delay_steps)  # each a row: by the state before the step
@@ -216,11 +216,11 @@ class LoopModel:
         return np.array([x, y, integral, *late[: self.delay_steps]])
 
     def growth(self, stiffness: float) -> float:
-        """Return the largest modulus of the eigenvalues at a stiffness [N / length]: above 1 the loop oscillates."""
+        """Return the largest modulus of the eigenvalues at a stiffness [N / length]: above 1 the loop is unstable."""
         return float(np.abs(np.linalg.eigvals(self.matrix(stiffness))).max())
 
     def largest_stiffness(self) -> float:
-        """Return the least stiffness [N / length] at which the loop no longer settles; infinite: there is none.
+        """Return the least stiffness [N / length] at which the loop is unstable; infinite: always stable.
 
         Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %. Only k kp and k ki count, so the largest
         stable gains at another stiffness are in inverse proportion.
@@ -237,18 +237,18 @@ class LoopModel:
     def simulate(
         self, force_n: Callable[[float], float], setpoint_n: FloatArray, noise_n: FloatArray, start: float = 0.0
     ) -> FloatArray:
-        """Return the (n,) depth at each step.
+        """Return the (n,) depths of the motor in the skin, one for each step [length].
 
         Parameters
         ----------
         force_n
-            Force of the skin at a depth.
+            Function from a depth to the force of the skin [N].
         setpoint_n
-            (n,) wanted force.
+            (n,) wanted force [N].
         noise_n
-            (n,) error of the force sensor.
+            (n,) errors of the force sensor [N].
         start
-            Depth at the first step, at which the loop has settled.
+            Depth at the first step, with the loop at rest.
         """
         x, velocity, resolution = start, 0.0, self.resolution_n
         controller = ForceController(self.law, force_n(start), start)
@@ -265,7 +265,7 @@ class LoopModel:
         return depths
 
     def _velocity(self, way: float, velocity: float) -> float:
-        """Return the velocity of this step: that of the lag, unless a limit of the motor holds it back."""
+        """Return the motor's velocity in this step: as its lag gives, or less where a limit of the motor acts."""
         period_s = self.law.period_s
         wish = way * (1 - self.lag_kept) / period_s
         if math.isinf(self.acceleration):

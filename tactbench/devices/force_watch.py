@@ -1,4 +1,4 @@
-"""Problems of a stream of forces: too large, not known, or too old. It has no input or output, and no clock.
+"""Detection of problems in a stream of forces: too large, unknown, or too old. No input, output or clock.
 
 An unknown force counts as too large a force.
 """
@@ -17,22 +17,22 @@ from tactbench.devices.guard_messages import Limits, Trigger
 from tactbench.devices.sequence import SequenceCheck
 
 DELAY_WINDOW_NS = 1_000_000_000
-"""Half of the time over which the least delay of a device's samples is taken (assumed: clocks that differ by 100 ppm
-move apart by 0.2 ms in the whole)."""
+"""Half of the time over which the least delay of a device's samples is determined [ns] (assumed: clocks that differ by
+100 ppm move apart by 0.2 ms in the full time)."""
 MOST_BLOCKS = 50_000
-"""Most blocks that wait for a rig: some 50 s at 1 kHz; then the oldest are dropped."""
+"""Largest number of blocks stored for a rig, about 50 s at 1 kHz; after that the oldest are dropped."""
 _LOOKED_AT = 3
-"""Number of samples of which two make a touch."""
+"""Number of newest samples tested for a touch; two above the threshold count as a touch."""
 _MOST_SOUND = 10_000
-"""Most samples of a mean: more than a second of the quickest force sensor, 7 kHz."""
+"""Largest number of samples in a mean: more than a second of the fastest force sensor (7 kHz)."""
 UNRATED_HZ = 100.0
-"""Rate of a force sensor that states none (assumed: a slow one)."""
+"""Assumed rate of a force sensor without a stated rate [Hz]: a low one."""
 
 
 def samples(stream: StreamSpec, seconds: float) -> int:
-    """Return the number of samples of a force stream in some seconds; one at least.
+    """Return the number of samples of a force stream in a time [s], at least 1.
 
-    A mean is taken over a number, not over a time: a busy host receives none for a while, and then many at once.
+    Means are over a number of samples, not a time: a busy host may receive no sample for a while, then many at once.
     """
     return max(1, round((stream.rate_hz or UNRATED_HZ) * seconds))
 
@@ -41,12 +41,12 @@ Problem = tuple[Trigger, str]
 
 
 class ForceWatch:
-    """Check of the samples of one force stream.
+    """Check of each sample in a stream of forces for values, losses and age.
 
     The age of a sample is the time since its receipt and, where the device has a clock of its own, its delay on the way
     beyond the least of the last second or two: a stream that is held up on its way is old although samples arrive. A
-    constant delay cannot be seen. Only the ceilings and unknown values are checked of a sample that is doubled or late:
-    it makes no touch and no age.
+    constant delay cannot be detected. A duplicated or late sample is only checked for ceilings and unknown values; it
+    affects neither touch nor age.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ class ForceWatch:
     Attributes
     ----------
     blocks
-        Samples that are newer than each one before, for the rig.
+        Blocks of samples for the rig, without duplicated and late samples.
     order
-        Order and losses of the samples by their numbers.
+        Check of the samples' numbers for lost, late and duplicated samples.
     force_n
-        Pressing force, less the zero, of the newest sample; NaN: none yet, or no limits.
+        Pressing force [N], less the zero, of the newest sample; NaN: no sample yet, or no limits.
     sequence, t_ns
-        Number and time of receipt of that sample; -1 and 0: none yet.
+        Number and time of receipt [ns] of the newest sample; -1 and 0: no sample yet.
     changed
-        Number of the newest sample that differs from the one before it in any channel; -1: none yet.
+        Number of the newest sample that differs from the previous sample in any channel; -1: none yet.
     received
         Number of samples so far.
     """
@@ -84,40 +84,40 @@ class ForceWatch:
         self._sound: deque[tuple[int, float]] = deque(maxlen=_MOST_SOUND)
 
     def touched(self, touch_n: float) -> bool:
-        """Return whether two of the last three samples are above a force [N]."""
+        """Return True if at least two of the last three samples are above a force [N]."""
         return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
 
     def mean_n(self, since_ns: int, count: int) -> float:
-        """Return the mean pressing force [N] of the newest `count` samples, all of them received after a time.
+        """Return the mean pressing force [N] of the newest `count` samples, if all were received after a time [ns].
 
-        NaN: fewer were received since, or one of them had a problem.
+        NaN: fewer samples were received after this time, or a sample had a problem.
         """
         while self._sound and (self._sound[0][0] < since_ns or len(self._sound) > count):
             self._sound.popleft()
         return fmean(force_n for _, force_n in self._sound) if len(self._sound) == count else math.nan
 
     def age_s(self, now_ns: int) -> float:
-        """Return the age of the newest sample [s]; infinite: there is none."""
+        """Return the age of the newest sample [s]; infinite if there is no sample."""
         return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else math.inf
 
     def old(self, now_ns: int, limits: Limits) -> Problem | None:
-        """Return the problem of a newest sample that is too old; None: it is not."""
+        """Return the problem if the newest sample is too old; None if it is not."""
         age_s = self.age_s(now_ns)
         if age_s <= limits.force_age_s:
             return None
-        return Trigger.FORCE_OLD, f"the newest force is {1e3 * age_s:.1f} ms old, {1e3 * limits.force_age_s:.1f} may be"
+        return Trigger.FORCE_OLD, f"the force is {1e3 * age_s:.1f} ms old, limit {1e3 * limits.force_age_s:.1f} ms"
 
     def take(self, block: Block, limits: Limits | None, *, travelling: bool = False) -> Problem | None:
-        """Take samples; return their first problem.
+        """Check received samples; return the first problem found, or None.
 
         Parameters
         ----------
         block
             The samples received.
         limits
-            The limits; None: only numbers, times and equal samples are updated.
+            Limits to check; None: only sample numbers, times and the count of equal samples are updated.
         travelling
-            Whether the ceiling of travel applies.
+            True if the force ceiling of travel applies, False for that of pressing.
         """
         newer = self.order(block)
         lost, same = (0, self._same) if newer is None else self._take_newer(newer)
@@ -130,9 +130,9 @@ class ForceWatch:
         wrenches = block.data - zero
         problem = _unknown(wrenches, block) or self._too_large(wrenches, limits, travelling)
         if problem is None and lost > limits.lost_samples:
-            problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, {limits.lost_samples} may be"
+            problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, limit {limits.lost_samples}"
         if problem is None and same >= limits.same_samples:
-            problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
+            problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are equal in every channel"
         if problem is not None:
             self._sound.clear()
         elif newer is not None and newer.t_ns is not None:
@@ -140,7 +140,7 @@ class ForceWatch:
         return problem
 
     def _take_newer(self, block: Block) -> tuple[int, int]:
-        """Update numbers and times; return the most samples lost in a row, and the most equal ones."""
+        """Update numbers and times; return the largest numbers of samples lost, and of samples equal, in a row."""
         self.blocks.append(block)
         rows = block.data
         numbers = self.sequence + 1 + np.arange(len(rows)) if block.sequence is None else block.sequence
@@ -165,14 +165,14 @@ class ForceWatch:
         ceiling = limits.travel_ceiling_n if travelling else limits.force_ceiling_n
         if largest >= ceiling:
             trigger = Trigger.TRAVEL_CEILING if travelling else Trigger.FORCE_CEILING
-            return trigger, f"{largest:.3f} N, the ceiling is {ceiling:g} N"
+            return trigger, f"force {largest:.3f} N, ceiling {ceiling:g} N"
         torque = float(np.linalg.norm(wrenches[:, self._torques], axis=1).max())
         if limits.torque_ceiling_nm is not None and torque >= limits.torque_ceiling_nm:
-            return Trigger.TORQUE_CEILING, f"{torque:.4f} N m, the ceiling is {limits.torque_ceiling_nm:g} N m"
+            return Trigger.TORQUE_CEILING, f"torque {torque:.4f} N m, ceiling {limits.torque_ceiling_nm:g} N m"
         return None
 
     def _delayed(self, t_ns: int, device_ns: int) -> int:
-        """Return the delay of a sample beyond the least one of the last time [ns]."""
+        """Return the delay of a sample beyond the least delay of the last second or two [ns]."""
         offset = t_ns - device_ns
         if not self._offsets or t_ns - self._offsets[-1][0] > DELAY_WINDOW_NS:
             self._offsets.append((t_ns, offset))
@@ -186,7 +186,7 @@ def _unknown(wrenches: FloatArray, block: Block) -> Problem | None:
         return Trigger.FORCE_NOT_A_NUMBER, "a sample of the force sensor is not a number"
     marks = 0 if block.quality is None else int(np.bitwise_or.reduce(block.quality, axis=None))
     if marks & Quality.SATURATED:
-        return Trigger.FORCE_SATURATED, "the force sensor reports an end of its range"
+        return Trigger.FORCE_SATURATED, "the force sensor reports a force at the end of its range"
     if marks & (Quality.MISSING | Quality.SUSPECT):
         return Trigger.FORCE_FLAGGED, "a sample of the force sensor is flagged as missing or suspect"
     return None

@@ -53,17 +53,17 @@ from tactbench.devices.positioner import Positioner, PositionerSilentError
 from tactbench.links.link import Clock
 
 FORCE = "force"
-"""Name of the force sensor beside the axes."""
+"""Name of the force sensor among the names of axes."""
 LOOK_S = 1e-3
-"""Longest wait for a force sample in one look: its sampling period."""
+"""Longest wait for a force sample in one check of all devices [s]: its sampling period."""
 ALIVE_S = 0.2
-"""Time for which the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
+"""Time for which the force is monitored before anything moves [s] (assumed: 200 samples at 1 kHz)."""
 AGAIN_S = 0.25
-"""Time after which a retreat that is not under way is sent again (assumed: more than an answer at 9600 baud takes)."""
+"""Time after which a retreat that has not begun is sent again [s] (assumed: above that of an answer at 9600 baud)."""
 RETREAT_S = 1.0
-"""Time beyond that of the way, or of the force's mean after it, after which a retreat has failed (assumed)."""
+"""Time added to the duration of a retreat, or of the force's mean after it, before it has failed [s] (assumed)."""
 REFUSED = 3
-"""Number of refused commands in a row that makes the guard retreat (assumed)."""
+"""Number of refused commands in a row after which the guard retreats (assumed)."""
 
 
 def largest_force_n(
@@ -71,37 +71,37 @@ def largest_force_n(
 ) -> float:
     """Return F_c + k v t_r + k v^2/(2 a) [N], the largest force of a move that is stopped at a ceiling F_c (derived).
 
-    With the threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness until then.
+    With the touch threshold as F_c, it is that of a first touch. k: largest stiffness up to F_c; t_r: reaction time.
     """
     return ceiling_n + stiffness_n_m * speed_m_s * (reaction + speed_m_s / (2 * acceleration_m_s2))
 
 
 class LocalGuard:
-    """A guard over open drivers, in the process and the time of the caller.
+    """A guard of axes with open drivers, which runs in the process, and on the clock, of the caller.
 
     Parameters
     ----------
     axes
-        By name, the pressing axis first, the others in the order in which they are homed; not started, closed with the
-        guard.
+        Drivers by axis name, not yet started: the pressing axis first, the others in the order of homing. The guard
+        closes them.
     force
-        The force sensor, with one stream; likewise.
+        Driver of the force sensor, with one stream; not yet started, and closed by the guard.
     clock
         Clock of all devices.
     advance
-        Lets time pass until a nanosecond of the clock; used only where the force sensor's link is gone.
+        Function that waits until a time of the clock [ns]; used only if the force sensor's link is gone.
     on_event
-        Called with each event.
+        Function called with each event.
     interrupted
-        Called while axes are homed or retracted; true halts them.
+        Function called while axes are homed or retracted; if it returns true, the axes halt.
     kept
-        A file that exists from arming until the pressing axis is known to be clear of the sensor, and contains the
-        reason; the next guard with this file begins with it. None: no file.
+        File that exists from arming until the pressing axis is known to be clear of the sensor, and states why it may
+        not be clear; the next guard reads this file at its start. None: no file.
 
     Attributes
     ----------
     force_blocks, motor_blocks, events
-        Samples of the force sensor, states of the pressing axis, and events, until the rig clears them. Force samples
+        Samples of the force sensor, states of the pressing axis, and events, until cleared by the rig. Force samples
         that are doubled or late are left out.
     """
 
@@ -141,20 +141,20 @@ class LocalGuard:
 
     @property
     def force_stream(self) -> StreamSpec:
-        """The force sensor's stream."""
+        """Stream of the force sensor."""
         (stream,) = self._force.streams
         return stream
 
     @property
     def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream."""
+        """Stream of the pressing axis: position, current, target."""
         (stream,) = self._press.streams
         return stream
 
     # Requests of a rig ------------------------------------------------------------------------------------------------
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
-        """Identify all devices, and let them sample; return their identities."""
+        """Identify all devices, and let them sample; return their identities by device name."""
         found = {}
         for name, device in {**self._axes, FORCE: self._force}.items():
             try:
@@ -167,26 +167,26 @@ class LocalGuard:
         return found
 
     def arm(self, limits: Limits) -> Report:
-        """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
+        """Check limits and force, home axes that are not homed, retract the pressing axis, and begin to expect beats.
 
-        The first beat is due within `heartbeat_s`. Samples from before are dropped.
+        The first beat is due within `heartbeat_s`. Earlier samples are dropped.
 
         Raises
         ------
         GuardRefusesError
-            If something is not as it must be; nothing was moved, or what was begun has ended. The state is IDLE, or
-            FAULT if force or an axis went wrong while homing.
+            If a condition for arming is not met; no axis has moved, or all moves have ended. The state is IDLE, or
+            FAULT if force or an axis failed while homing.
         """
         self._check(limits)
         self._check_force(limits)
         try:
             self._store_reason(
-                f"it was armed at {datetime.now().isoformat(' ', 'seconds')}, and not seen to be out since"
+                f"armed at {datetime.now().isoformat(' ', 'seconds')}, and not known to have retreated since"
             )
         except OSError as error:
-            hint = "Make room, or name another file as `guard_log:` in the rig file."
+            hint = "Free disk space, or name another file as `guard_log:` in the rig file."
             raise GuardRefusesError(
-                f"The guard does not arm: {self._kept} is not written: {error}.", hint=hint
+                f"The guard does not arm: {self._kept} cannot be written: {error}.", hint=hint
             ) from error
         self._not_out = ""
         for name, axis in self._axes.items():
@@ -210,7 +210,7 @@ class LocalGuard:
         return self._report()
 
     def beat(self, beat: Beat) -> Report:
-        """Note that the rig is alive, and carry out its command; return at once."""
+        """Process a beat of the rig: note its time, and carry out its command; return at once."""
         limits = self._limits
         if self.state is GuardState.ARMED and limits is not None:
             self._counts["beats"] += 1
@@ -228,21 +228,21 @@ class LocalGuard:
             self._refused += 1
             self._record(None, f"refused in {beat.state or 'no state'}: {reason}")
             if self._refused >= REFUSED:
-                self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
+                self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, reason of the last: {reason}")
         elif beat.command is not CommandKind.NONE:
             self._refused = 0
         return self._report(reason, early=early)
 
     def advance(self, until_ns: int) -> None:
-        """Look until the clock is at a nanosecond."""
+        """Check all devices repeatedly until the clock has reached `until_ns`."""
         while (left_ns := until_ns - self._clock()) > 0:
             self.look(min(LOOK_S, 1e-9 * left_ns))
 
     @property
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Counts of the drivers, and the guard's ``beats``, ``early``, ``refused``.
+        """Event counts of the drivers by device, and of the guard: ``beats``, ``early`` and ``refused`` commands.
 
-        The force sensor's also have ``duplicates`` and ``late`` samples, which are dropped, and missing ones, ``gaps``.
+        The force sensor's include ``duplicates`` and ``late`` samples, both dropped, and missing samples, ``gaps``.
         """
         force, order = Counter(self._force.counts), self._watch.order
         force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
@@ -250,7 +250,7 @@ class LocalGuard:
         return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
-        """Retreat, and expect no more beats; a fault is cleared.
+        """Retreat, and expect no more beats; this also clears a fault.
 
         `Report.not_out` stays until an operator has confirmed that the indenter is clear, also for the next guard.
         """
@@ -278,7 +278,7 @@ class LocalGuard:
     # Looking ----------------------------------------------------------------------------------------------------------
 
     def look(self, timeout_s: float) -> None:
-        """Read all devices, waiting at most so long for a force sample, and act on what is wrong."""
+        """Read all devices, waiting at most `timeout_s` for a force sample, and react to problems."""
         began_ns = self._clock()  # where this look itself is held up, a beat may wait that was not received yet
         watched = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
         problem = self._read_devices(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
@@ -302,18 +302,18 @@ class LocalGuard:
 
     @property
     def _unclear(self) -> str:
-        """Reason why an operator has to see that the indenter is clear of the sensor; empty: none."""
+        """Reason why an operator has to confirm that the indenter is clear of the sensor; empty: no need."""
         unhomed = self._home_anew | {name for name, axis in self._axes.items() if not axis.homed}
         here = [name for name, axis in self._axes.items() if axis.facts.homes_here and name in unhomed]
-        return self._not_out or (f"{', '.join(here)} is homed where it stands" if here else "")
+        return self._not_out or (f"{', '.join(here)} takes its present place as home" if here else "")
 
     def _check_beat(self, now_ns: int, limits: Limits) -> None:
         age_s = 1e-9 * (now_ns - self._beat_ns)
         if age_s > limits.heartbeat_s:
-            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be")
+            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, limit {1e3 * limits.heartbeat_s:.1f} ms")
 
     def _read_devices(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
-        """Read all devices; return the first problem, that of the force first."""
+        """Read all devices; return the first problem, those of the force before those of axes."""
         problem = self._take_force(timeout_s, limits, travelling=travelling)
         problems = [problem, *(self._take_axis(name, axis, limits) for name, axis in self._axes.items())]
         return next(filter(None, problems), None)
@@ -321,7 +321,7 @@ class LocalGuard:
     def _take_force(self, timeout_s: float, limits: Limits | None, *, travelling: bool = True) -> Problem | None:
         if FORCE in self._lost:
             self._advance(self._clock() + round(1e9 * timeout_s))
-            return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
+            return None if limits is None else (Trigger.FORCE_LOST, "the link of the force sensor is gone")
         watch = self._watch
         try:
             blocks = self._force.read(timeout_s)
@@ -357,25 +357,25 @@ class LocalGuard:
     # Commands ---------------------------------------------------------------------------------------------------------
 
     def _command(self, beat: Beat, limits: Limits) -> tuple[str, bool]:
-        """Carry out the command of a beat; return the reason if it is refused, and whether it only is too early."""
+        """Carry out a beat's command; return the reason of a refusal (else empty), and True if it came too early."""
         if beat.command is CommandKind.NONE:
             return "", False
         if beat.command is CommandKind.RETREAT:
-            self.trip(Trigger.COMMANDED, "the rig has commanded it")
+            self.trip(Trigger.COMMANDED, "commanded by the rig")
             return "", False
         if beat.command is CommandKind.STOP:
             self._into_skin = False
             self._halt(*(axis for axis in self._axes.values() if axis.moving))
             return "", False
         if beat.force_sequence > self._watch.sequence:
-            return f"force sample {beat.force_sequence} has not come", False
+            return f"force sample {beat.force_sequence} has not been received", False
         travels, press = beat.command is CommandKind.TRAVEL, self._press
         if reason := self._travel_reason(beat) if travels else self._press_reason(beat, limits):
             return reason, False
         if any(axis.moving for axis in self._axes.values()):
             return "an axis is moving", True
         if min(beat.force_sequence, self._watch.changed) <= self._end_sequence:
-            return "no force sample is known from after the last move", True
+            return "no force sample has come since the last move", True
         self._into_skin = self._touched = False
         try:
             if travels:
@@ -400,7 +400,7 @@ class LocalGuard:
         return ""
 
     def _press_reason(self, beat: Beat, limits: Limits) -> str:
-        """Return the reason why the pressing axis may not move; empty: it may."""
+        """Return the reason why the pressing axis may not move as commanded; empty if it may."""
         state, force_n = self._press.state, self._watch.force_n
         if state is None or math.isnan(state.target):
             return f"the target of {self._name} is not known"
@@ -411,15 +411,15 @@ class LocalGuard:
         if is_step:
             resolution = self._press.facts.resolution
             too_long = not abs(beat.distance_m) < (round(limits.step_m / resolution) + 0.5) * resolution
-            return f"a step of {beat.distance_m:g} m is longer than allowed" if too_long else ""
+            return f"a step of {beat.distance_m:g} m is too long" if too_long else ""
         if not 0.0 < beat.speed_m_s <= limits.speed_m_s * (1 + 1e-9):
-            return f"a speed of {beat.speed_m_s:g} m/s is not within {limits.speed_m_s:g} m/s"
+            return f"a speed of {beat.speed_m_s:g} m/s is not above 0 and up to {limits.speed_m_s:g} m/s"
         if target_m > state.target and not force_n < limits.touch_n:
-            return f"it would move into the skin in contact, at {force_n:.3f} N"
+            return f"a move into the skin, already in contact at {force_n:.3f} N"
         return ""
 
     def _halt(self, *axes: Positioner) -> None:
-        """Halt axes; retreat if that fails."""
+        """Halt axes; retreat if a halt fails."""
         try:
             for axis in axes:
                 axis.halt()
@@ -429,7 +429,7 @@ class LocalGuard:
     # Retreat ----------------------------------------------------------------------------------------------------------
 
     def trip(self, trigger: Trigger, text: str) -> None:
-        """Begin a retreat, if the guard is armed; the first reason stands."""
+        """Begin a retreat, if the guard is armed; the reason of a retreat under way is kept."""
         if self.state is not GuardState.ARMED:
             return
         self.state, self.trigger = GuardState.RETREATING, trigger
@@ -454,9 +454,9 @@ class LocalGuard:
                 continue
 
     def _continue_retreat(self) -> None:
-        """End the retreat if the pressing axis is out and the others stand, or it has failed; send it again if needed.
+        """End a retreat that is complete (pressing axis out, others at rest) or has failed; send it again if needed.
 
-        The pressing axis is out where it stands at its place of retreat and the mean force since is near zero.
+        The pressing axis is out if it is at rest at its place of retreat and the mean force since then is near zero.
         """
         press, now_ns, limits = self._press, self._clock(), self._limits
         assert limits is not None
@@ -469,16 +469,16 @@ class LocalGuard:
         force_n = self._watch.mean_n(self._there_ns, samples(self.force_stream, limits.clear_s)) if there else math.nan
         stand = not any(axis.moving and name not in self._lost for name, axis in self._others.items())
         if stand and lost and (there or self._name in lost):
-            self._end(Trigger.AXIS_LOST, f"stand clear: {', '.join(lost)} ends its last move and holds there")
+            self._end(Trigger.AXIS_LOST, f"stand clear: {', '.join(lost)} completes its last move and holds there")
         elif stand and abs(force_n) < limits.clear_n:
             self._end(None, f"out after {took}")
         elif stand and there:
             if FORCE in self._lost or now_ns > self._there_ns + 1e9 * (limits.clear_s + RETREAT_S):
                 where = f"at its place of retreat after {took}, and the force is {force_n:.2f} N"
-                text = f"NOT KNOWN TO BE OUT: {where}: stand clear, and see what the indenter touches"
+                text = f"NOT KNOWN TO BE OUT: {where}: stand clear, and check what the indenter touches"
                 self._end(Trigger.NOT_CLEAR, text)
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
-            power = "left under power, since it may fall without"
+            power = "left under power, since it may fall without power"
             if press.facts.holds_unpowered:
                 with suppress(LinkError, RigError):
                     press.disable()
@@ -499,7 +499,7 @@ class LocalGuard:
         self._record(failed, text)
 
     def _store_reason(self, text: str) -> None:
-        """Store for the next guard the reason why the pressing axis is not known to be out; empty: it is out."""
+        """Store the reason why the pressing axis is not known to be out for the next guard; empty: it is out."""
         if self._kept is not None and text:
             self._kept.write_text(text, encoding="utf-8")
         elif self._kept is not None:
@@ -508,12 +508,12 @@ class LocalGuard:
     # Arming -----------------------------------------------------------------------------------------------------------
 
     def _check(self, limits: Limits) -> None:
-        """Raise GuardRefusesError where state, limits and axes do not allow to arm."""
+        """Raise GuardRefusesError if state, limits or axes do not permit arming."""
         facts, (low, high), zeros = self._press.facts, limits.travel_m, len(limits.zero)
         endless = [name for name, axis in self._axes.items() if not all(map(math.isfinite, axis.facts.limits))]
         stated = (facts.retreat, facts.retreat_speed, facts.speed, facts.acceleration)
         for wrong, problem in (
-            (self.state is not GuardState.IDLE, f"it is in state {self.state}, and is disarmed first"),
+            (self.state is not GuardState.IDLE, f"its state is {self.state}: disarm it first"),
             (endless, f"no ends of travel are stated for {', '.join(endless)}"),
             (
                 not all(axis.facts.interruptible for axis in self._axes.values()),
@@ -521,23 +521,23 @@ class LocalGuard:
             ),
             (
                 not all(map(math.isfinite, stated)) or not facts.corridor > 0,
-                f"{self._name} does not state retreat, retreat speed, speed, acceleration and corridor",
+                f"{self._name} must state retreat, retreat speed, speed, acceleration and corridor",
             ),
-            (not facts.limits[0] <= low < high <= facts.limits[1], "the travel is not within the axis' ends"),
-            (not low <= facts.retreat < high, "the place to retreat to is not within the travel, away from its end"),
-            (facts.corridor > limits.step_m, "the axis' corridor is longer than a step"),
+            (not facts.limits[0] <= low < high <= facts.limits[1], "the limits' travel is beyond the axis' ends"),
+            (not low <= facts.retreat < high, "the place of retreat is not within the travel, below its end"),
+            (facts.corridor > limits.step_m, "the axis' corridor is longer than the largest step"),
             (
                 zeros != len(self.force_stream.channels),
-                f"there are {zeros} zeros, not one for each channel of the force",
+                f"the limits have {zeros} zeros, not one for each channel of the force",
             ),
             (self._lost, "a device is gone: close the guard and open a new one"),
-            (not limits.confirmed and self._unclear, f"{self._unclear}; an operator has to see that it is clear"),
+            (not limits.confirmed and self._unclear, f"{self._unclear}; an operator must confirm that it is clear"),
         ):
             if wrong:
                 raise GuardRefusesError(f"The guard does not arm: {problem}.", hint="See docs/hardware.md, Safety.")
 
     def _check_force(self, limits: Limits) -> None:
-        """Watch the unloaded force for a while; raises GuardRefusesError."""
+        """Monitor the unloaded force for `ALIVE_S`; raises GuardRefusesError if there is a problem."""
         before = -1
         while self._watch.received != before:  # samples that have waited since the last look
             before = self._watch.received
@@ -557,7 +557,7 @@ class LocalGuard:
             )
 
     def _make_ready(self, name: str, axis: Positioner, limits: Limits) -> None:
-        """Home an axis that is not homed, while the force is watched, enable it, and retract the pressing one."""
+        """Home an axis if needed, while the force is monitored; enable it, and retract the pressing axis."""
         problem: Problem | None = None
 
         def stop() -> bool:
@@ -586,7 +586,7 @@ class LocalGuard:
         while press.moving or not self._retracted or press.state is None or press.state.t_ns <= sent_ns:
             problem = self._read_devices(LOOK_S, limits, travelling=True) or self._interruption()
             if problem is None and self._clock() > deadline_ns:
-                problem = Trigger.HOMING, "it has not come to its place of retreat in its time"
+                problem = Trigger.HOMING, "it did not reach its place of retreat in time"
             if problem is not None:
                 self._homing_failed(self._name, *problem)
 
@@ -594,17 +594,17 @@ class LocalGuard:
         return (Trigger.TERMINATED, "interrupted") if self._interrupted() else None
 
     def _homing_failed(self, name: str, trigger: Trigger, text: str) -> NoReturn:
-        outcome = f"{name} stands where it was homed or retracted"
+        outcome = f"{name} is at rest after an interrupted homing or retraction"
         if not self._stands(name):
-            outcome = f"{name} was halted while it was homed or retracted, and is not known to stand: stand clear"
+            outcome = f"{name} was halted while being homed or retracted, and is not known to be at rest: stand clear"
             self._not_out = outcome
         self.state, self.trigger = GuardState.FAULT, Trigger.HOMING
         self._record(Trigger.HOMING, f"{name}: {trigger}: {text}")
-        hint = "See what the indenter touches; then disarm, and arm again."
+        hint = "Check what the indenter touches; then disarm, and arm again."
         raise GuardRefusesError(f"{outcome}: {trigger}: {text}", hint=hint)
 
     def _stands(self, name: str) -> bool:
-        """Halt an axis repeatedly; return whether it reports the same place for a while."""
+        """Halt an axis repeatedly; return True if it then reports the same place for `AGAIN_S`."""
         axis, place = self._axes[name], math.nan
         since_ns = begin_ns = again_ns = self._clock()
         while self._clock() < begin_ns + 1e9 * RETREAT_S:

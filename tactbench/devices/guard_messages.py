@@ -17,28 +17,28 @@ from tactbench.core.samples import FloatArray
 
 
 class GuardRefusesError(RigError):
-    """The guard does not arm."""
+    """The guard refuses to be armed; the message states the reason."""
 
 
 class GuardLostError(RigError):
-    """The guard's process is gone or silent; the message states whether the pressing axis has retreated."""
+    """The guard's process has ended or does not answer; the message states if the pressing axis has retreated."""
 
 
 class GuardState(StrEnum):
-    """State of a guard."""
+    """State of the guard of a rig's axes."""
 
     IDLE = "idle"
-    """Nothing may move."""
+    """Not armed: no axis may move."""
     ARMED = "armed"
     RETREATING = "retreating"
     RETREATED = "retreated"
-    """After a retreat by command; all axes stand."""
+    """After a commanded retreat; all axes are at rest."""
     FAULT = "fault"
-    """After a failure; all axes stand, or the event names the one that does not. Ended by `disarm`."""
+    """After a failure; all axes are at rest, or the event names the axis that is not. Ended by `disarm`."""
 
 
 class Trigger(StrEnum):
-    """Reason of a retreat. All but the first two lead to :attr:`GuardState.FAULT`."""
+    """Reason of a retreat. All except the first two lead to :attr:`GuardState.FAULT`."""
 
     COMMANDED = "retreat commanded"
     TERMINATED = "SIGTERM"
@@ -65,71 +65,71 @@ class Trigger(StrEnum):
 
 
 class CommandKind(StrEnum):
-    """Command of a beat."""
+    """Command to the guard, part of each beat."""
 
     NONE = "none"
     STEP = "step"
-    """Move the pressing axis by `distance_m`, at most `Limits.step_m`: one increment at a time, each only after a force
-    sample that was taken after the end of the one before."""
+    """Move the pressing axis by `distance_m`, at most `Limits.step_m`: one increment at a time, each only after a
+    force sample that was taken after the end of the increment before."""
     MOVE_TO = "move to"
-    """Move the pressing axis to `position_m` at `speed_m_s`: out of contact, or away from the skin. On the way into the
+    """Move the pressing axis to `position_m` at `speed_m_s`, out of contact, or away from the skin. On the way into the
     skin the guard itself halts it when two of three force samples in a row are above `Limits.touch_n`."""
     TRAVEL = "travel"
-    """Move other axes to `targets`, while the pressing axis stands at its place of retreat."""
+    """Move axes other than the pressing axis to `targets`, while the pressing axis is at its place of retreat."""
     STOP = "stop"
     """Halt all axes."""
     RETREAT = "retreat"
-    """Retreat, which ends in :attr:`GuardState.RETREATED`."""
+    """Retreat; this ends in :attr:`GuardState.RETREATED`."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a guard, fixed from `arm` on.
+    """Limits that a guard enforces, fixed when it is armed.
 
     Raises
     ------
     UsageError
-        If a number is not finite, or they contradict each other.
+        If a number is not finite, or numbers contradict each other.
     """
 
     force_ceiling_n: float
-    """Ceiling of the norm of the raw force, in one sample, while pressing."""
+    """Norm of the raw force in a single sample at which the guard retreats while pressing [N]."""
     travel_ceiling_n: float
-    """Ceiling while any other axis moves, or any axis is homed or retracted."""
+    """The same while another axis moves, or any axis is homed or retracted [N]."""
     touch_n: float
-    """Raw pressing force that is a touch; below it the pressing axis is out of contact."""
+    """Raw pressing force above which there is contact with the skin [N]."""
     travel_m: tuple[float, float]
-    """Least and greatest target of the pressing axis."""
+    """Least and greatest permitted target of the pressing axis [m]."""
     step_m: float
-    """Longest increment: loop speed times control period."""
+    """Longest increment [m]: speed of the force loop times control period."""
     speed_m_s: float
-    """Largest speed of any move of the pressing axis."""
+    """Largest permitted speed of the pressing axis [m/s]."""
     heartbeat_s: float
-    """T_dead, the largest age of a beat."""
+    """Largest permitted age of the last beat, T_dead [s]."""
     force_age_s: float
-    """Largest age of a force sample."""
+    """Largest permitted age of the newest force sample [s]."""
     channel: int
     """Index of the pressing channel in the force stream."""
     sign: int
-    """-1: pressing makes that channel fall."""
+    """1 if pressing makes the pressing channel rise, -1 if it makes the channel fall."""
     zero: tuple[float, ...]
     """Zero of every channel of the force stream, in its units; subtracted from raw samples."""
     confirmed: bool = False
-    """Whether an operator has seen that the indenter is clear of the sensor; see :attr:`Report.unclear`."""
+    """True if an operator has confirmed that the indenter is clear of the sensor; see :attr:`Report.unclear`."""
     clear_n: float = 0.1
-    """Largest size of the mean pressing force with which the pressing axis, at its place of retreat, is clear of the
-    sensor: above the noise of that mean (assumed)."""
+    """Largest absolute mean pressing force with which the pressing axis, at its place of retreat, is clear of the
+    sensor [N]: above the noise of the mean (assumed)."""
     clear_s: float = 0.1
-    """Time whose samples make that mean."""
+    """Time over which this mean is formed [s]."""
     torque_ceiling_nm: float | None = None
-    """Ceiling of the norm of the raw torque; None: torque is not checked."""
+    """Norm of the raw torque at which the guard retreats [N*m]; None: not checked."""
     same_samples: int = 50
-    """Number of equal samples in a row that stand for a stuck sensor (assumed)."""
+    """Number of equal samples in a row after which a force sensor counts as stuck (assumed)."""
     lost_samples: int = 3
-    """Most samples that may be missing between two (assumed)."""
+    """Largest permitted number of samples lost in a row (assumed)."""
 
     def pressing_n(self, data: FloatArray) -> FloatArray:
-        """Return the (n,) raw pressing forces, less the zero, of (n, channels) samples of the force stream."""
+        """Return the (n,) raw pressing forces [N], less the zero, of (n, channels) samples of the force stream."""
         return np.asarray(self.sign * (data[:, self.channel] - self.zero[self.channel]))
 
     def __post_init__(self) -> None:
@@ -148,78 +148,78 @@ class Limits:
             and self.sign in (-1, 1)
         ):
             raise UsageError(
-                f"The guard's limits are not positive and finite, or contradict each other: {self}.",
+                f"Limits of the guard must be positive and finite, and must not contradict: {self}.",
                 hint="See docs/hardware.md, Safety.",
             )
 
 
 @dataclass(frozen=True)
 class Beat:
-    """Message of a rig once a control period: a sign of life, and a command."""
+    """Message of the rig to the guard in each control period: a sign of life, and a command."""
 
     t_ns: int = 0
-    """Time at which it was made."""
+    """Time at which the beat was made."""
     state: str = ""
-    """State of the press, for the log."""
+    """State of the press, written to the log."""
     command: CommandKind = CommandKind.NONE
     distance_m: float = 0.0
-    """Length of a step, from `Report.target_m`; rounded to increments of the axis, so that the rig keeps remainders."""
+    """Length of a STEP from `Report.target_m`; rounded to the axis' resolution, so the rig adds remainders later."""
     position_m: float = math.nan
-    """Target of MOVE_TO."""
+    """Target position of MOVE_TO."""
     speed_m_s: float = math.nan
-    """Speed of MOVE_TO."""
+    """Speed of MOVE_TO [m/s]."""
     force_sequence: int = -1
-    """`Report.force_sequence` of the sample that a step is based on."""
+    """`Report.force_sequence` of the force sample on which a step is based."""
     targets: Mapping[str, float] = field(default_factory=dict)
-    """Targets of TRAVEL, by axis."""
+    """Targets of TRAVEL by axis name."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """Answer of a guard."""
+    """Answer of the guard to a beat."""
 
     t_ns: int
     state: GuardState
     reason: str = ""
-    """Reason why the command is not carried out; empty: it is."""
+    """Reason why the command is not carried out; empty if it is carried out."""
     early: bool = False
-    """Whether the command only came before its time: the move before has not ended, or no force sample was taken since.
-    It may be sent again, and does not count as refused."""
+    """True if the command only came too early: the last move has not ended, or no force sample was taken since. The
+    command may be sent again, and does not count as refused."""
     moving: bool = False
-    """Whether any axis moves."""
+    """True if any axis is moving."""
     position_m: float = math.nan
-    """Last position of the pressing axis."""
+    """Last read position of the pressing axis."""
     target_m: float = math.nan
     positions: Mapping[str, float] = field(default_factory=dict)
-    """Last position of each axis."""
+    """Last read position of each axis, by name."""
     force_n: float = math.nan
-    """Latest raw pressing force, less the zero."""
+    """Latest raw pressing force [N], less the zero."""
     force_sequence: int = -1
-    """Number of that sample, by the count of its device or of the guard."""
+    """Number of the latest force sample, counted by its device or by the guard."""
     touched: bool = False
-    """Whether the guard has ended the last MOVE_TO at a touch."""
+    """True if the guard has ended the last MOVE_TO at a touch."""
     trigger: Trigger | None = None
-    """Reason of the retreat."""
+    """Reason of the last retreat; None: no retreat."""
     not_out: str = ""
-    """Instruction to an operator where an axis did not come out or does not stand; empty: none."""
+    """Instruction to an operator if an axis has not retreated or is not at rest; empty: no instruction."""
     unclear: str = ""
-    """Reason why an operator has to see that the indenter is clear before the guard arms; empty: none."""
+    """Reason why an operator must confirm, before arming, that the indenter is clear; empty: no need."""
 
     @property
     def accepted(self) -> bool:
-        """Whether the command is carried out."""
+        """True if the command is carried out."""
         return not self.reason
 
 
 @dataclass(frozen=True)
 class Event:
-    """Event for the log and the recording."""
+    """One event of the guard, for its log and the recording."""
 
     t_ns: int
     state: GuardState
-    """State after it."""
+    """State of the guard after the event."""
     trigger: Trigger | None
-    """None: an ordinary event, such as `armed`."""
+    """Reason of a retreat; None: an ordinary event, such as `armed`."""
     force_n: float
     position_m: float
     text: str

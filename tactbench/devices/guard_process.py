@@ -1,13 +1,13 @@
-"""The guard in a process of its own, which holds the links of all axes and of the force sensor, and outlives its rig.
+"""The guard in a separate process, which owns the links of all axes and of the force sensor, and outlives its rig.
 
-The rig holds a :class:`GuardProcess`. The process is started in a session of its own, so that Ctrl-C at the terminal
-does not reach it; it ignores SIGINT and SIGHUP, and retreats and ends on SIGTERM. In one thread it serves a request of
-the rig, looks at all devices once, and so on; it never waits for the rig. Each answer carries the samples and events
+The rig holds a :class:`GuardProcess`. The process is started in its own session, so that Ctrl-C at the terminal does
+not reach it; it ignores SIGINT and SIGHUP, and on SIGTERM it retreats and ends. In one thread it alternately serves
+requests of the rig and checks all devices; it never waits for the rig. Each answer carries the samples and events
 since the answer before. Requests and answers are pickled by :mod:`multiprocessing.connection`.
 
 When the rig dies, the process retreats, logs the retreat and ends. It detects this by the end of the connection, by
-its parent's process id, or, where another process keeps the connection open and where the rig only hangs, by the age of
-the last beat. When the process dies or does not answer a beat within heartbeat_s, the rig's side kills it, opens the
+its parent's process id, or, if another process keeps the connection open or the rig only hangs, by the age of the
+last beat. When the process dies or does not answer a beat within heartbeat_s, the rig's side kills it, opens the
 axes' links and sends the same retreat, provided that the rig calls :meth:`GuardProcess.beat` or
 :meth:`GuardProcess.advance`. If both die, each axis ends its last move and holds.
 
@@ -54,25 +54,25 @@ from tactbench.devices.guard_messages import (
 from tactbench.links.address import open_link
 
 START_S = 60.0
-"""Timeout for the start of the process and of all devices (assumed: imports of a busy machine)."""
+"""Timeout for the start of the process and of all devices [s] (assumed: imports on a busy machine)."""
 ARM_S = 180.0
-"""Timeout for homing and retracting the axes."""
+"""Timeout for homing and retracting the axes [s]."""
 OPEN_S = 1.0
-"""Timeout for a port that another process still holds (assumed; free 5 ms after that was killed, measured)."""
+"""Timeout for a port still open in another process [s] (assumed; measured: free 5 ms after that process is killed)."""
 MESSAGE_S = 0.5
-"""Timeout for the rest of a message that was begun: its sender or its receiver has stopped (assumed)."""
+"""Timeout for the rest of a partly sent message [s]: its sender or receiver has stopped (assumed)."""
 IDLE_S = 0.05
-"""Wait for a request before the devices are open."""
+"""Wait for a request before the devices are open [s]."""
 
 
 @dataclass(frozen=True)
 class DeviceSettings:
-    """One device that the guard opens."""
+    """Driver, link and options of one device that the guard opens."""
 
     driver: str
-    """``module:build``."""
+    """Function that builds the driver, as ``module:name``."""
     link: str
-    """Address."""
+    """Address of the link."""
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def open(self) -> Any:
@@ -90,24 +90,24 @@ class DeviceSettings:
 
 @dataclass(frozen=True)
 class ProcessSettings:
-    """Devices and files of a guard's process."""
+    """Devices and log file of a guard's process."""
 
     axes: Mapping[str, DeviceSettings]
-    """The pressing one first."""
+    """Settings by axis name; the pressing axis is the first."""
     force: DeviceSettings
     log: str
-    """Path of the log, to which each event is appended as a line of JSON. A file beside it, ending in ``.not-out``,
+    """Path of the log, to which each event is appended as one line of JSON. A file beside it, ending in ``.not-out``,
     exists while the pressing axis is not known to be clear of the sensor; the next guard reads it."""
 
     def rescue(self, *, retreat: bool) -> str:
-        """Open the axes' links, halt all axes, and let the pressing axis retreat if `retreat`; return the outcome.
+        """Open the axes' links, halt all axes, and retract the pressing axis if `retreat`; return the outcome as text.
 
         Raises
         ------
         LinkError, RigError
-            If an axis does not obey; the others were commanded before.
+            If an axis does not follow its command; all other axes were commanded before.
         """
-        outcome, failed = "the axes were sent to stand", None
+        outcome, failed = "the axes were commanded to halt", None
         press, *others = self.axes
         for name in (*others, press):
             away = retreat and name == press
@@ -115,7 +115,7 @@ class ProcessSettings:
                 with self.axes[name].open() as axis:
                     place = axis.rescue(retreat_seconds(axis) if away else None)
                     if away:
-                        outcome = f"{name} has retreated to {place:g} m, and the force there was not looked at"
+                        outcome = f"{name} has retreated to {place:g} m, the force there was not measured"
             except (LinkError, RigError) as error:
                 failed = error
         if failed is not None:
@@ -124,10 +124,10 @@ class ProcessSettings:
 
 
 class GuardProcess:
-    """A guard in a process of its own, with the methods and attributes of :class:`~.guard.LocalGuard`.
+    """The rig's access to a guard in another process, with the methods and attributes of :class:`~.guard.LocalGuard`.
 
-    Once the process is lost, each request raises GuardLostError. Samples, events and counts are those of the answers so
-    far.
+    Once the process is lost, each request raises GuardLostError. Samples, events and counts are those
+    received in answers.
 
     Parameters
     ----------
@@ -141,9 +141,9 @@ class GuardProcess:
     """
 
     force_stream: StreamSpec
-    """The force sensor's stream, once it is started."""
+    """Stream of the force sensor, set by :meth:`start`."""
     motor_stream: StreamSpec
-    """The pressing axis' stream, likewise."""
+    """Stream of the pressing axis, set by :meth:`start`."""
 
     def __init__(self, settings: ProcessSettings) -> None:
         if os.name != "posix":
@@ -173,7 +173,7 @@ class GuardProcess:
             )
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
-        """Let the process open and start all devices; return their identities."""
+        """Let the process open and start all devices; return their identities by device name."""
         identity, self.force_stream, self.motor_stream = self._request("start", START_S, self._settings)
         return identity  # type: ignore[no-any-return]
 
@@ -187,17 +187,17 @@ class GuardProcess:
             raise
 
     def beat(self, beat: Beat) -> Report:
-        """Send a beat and return its report, which takes some milliseconds."""
+        """Send a beat and return the guard's report on it; takes some milliseconds."""
         return self._request("beat", self._timeout_s, beat)  # type: ignore[no-any-return]
 
     def advance(self, until_ns: int) -> None:
-        """Wait until the clock is at a nanosecond, and receive the samples and events since the last request."""
+        """Wait until the clock has reached `until_ns`, then receive the samples and events since the last request."""
         if self._lost is None:
             self._connection.poll(max(0.0, 1e-9 * (until_ns - time.monotonic_ns())))  # its end ends the wait
         self._request("collect", self._timeout_s)
 
     def disarm(self) -> Report:
-        """Retreat if the pressing axis is not out, and expect no more beats."""
+        """Retreat if the pressing axis has not retreated, and expect no more beats."""
         report: Report = self._request("disarm", ARM_S)
         self._limits = None
         return report
@@ -222,7 +222,7 @@ class GuardProcess:
         return START_S if self._limits is None else self._limits.heartbeat_s
 
     def _request(self, what: str, timeout_s: float, given: Any = None) -> Any:
-        """Send a request and return its result; raises the error that the process answers, or GuardLostError."""
+        """Send a request and return its result; raises the error returned by the process, or GuardLostError."""
         if self._lost is not None:
             raise self._lost
         self._requested, self._number, number = what, self._number + 1, 0
@@ -231,22 +231,22 @@ class GuardProcess:
             self._connection.send((self._number, what, given))
             while number != self._number:  # an answer to an interrupted request comes before
                 if not self._connection.poll(max(0.0, until_s - time.monotonic())):
-                    self._fail(f"it has not answered within {timeout_s:.3f} s")
+                    self._fail(f"no answer within {timeout_s:.3f} s")
                 number, result, force_blocks, motor_blocks, events, self.counts = self._connection.recv()
                 self.force_blocks += force_blocks
                 self.motor_blocks += motor_blocks
                 self.events += events
         except (EOFError, OSError, UnpicklingError):
-            self._fail("its connection has ended")
+            self._fail("the connection has ended")
         if isinstance(result, TactbenchError):
             raise result
         return result
 
     def _fail(self, why: str) -> NoReturn:
-        """Kill the process and let the pressing axis retreat; raises GuardLostError, as every later request does."""
+        """Kill the process and retract the pressing axis; raises GuardLostError, as every later request does."""
         with suppress(OSError):
             self._process.kill()
-        outcome, trigger = "no axis was armed, nothing was sent", Trigger.GUARD_LOST
+        outcome, trigger = "no axis was armed, so no command was sent", Trigger.GUARD_LOST
         try:
             if self._limits is not None:
                 outcome = self._settings.rescue(retreat=self._requested != "arm")
@@ -262,11 +262,11 @@ class GuardProcess:
 
 
 Guard: TypeAlias = LocalGuard | GuardProcess
-"""The guard that a rig drives its axes through: in the rig's process, or in one of its own."""
+"""Guard through which a rig moves its axes: in the rig's process, or in a separate process."""
 
 
 class _Server:
-    """The loop of the process: requests of the rig, and one look at the devices, in turn."""
+    """Main loop of the guard's process: serve requests of the rig, and check all devices, in turn."""
 
     def __init__(self, connection: Connection[Any, Any]) -> None:
         self._connection, self._parent = connection, os.getppid()
@@ -274,7 +274,7 @@ class _Server:
         self._closing = self._rig_gone = self.terminated = False
 
     def run(self) -> None:
-        """Serve until the rig has sent `close` or is gone, or SIGTERM has come; then close the devices."""
+        """Serve until the rig sends `close` or ends, or until SIGTERM; then retreat and close the devices."""
         while not self._over():
             if self._guard is not None:
                 self._guard.look(LOOK_S)
@@ -290,12 +290,12 @@ class _Server:
         if guard is None or self._closing or not (self._rig_gone or self.terminated):
             return self._closing or self._rig_gone or self.terminated
         if self.terminated:
-            guard.trip(Trigger.TERMINATED, "the guard's process was sent SIGTERM")
+            guard.trip(Trigger.TERMINATED, "the guard's process received SIGTERM")
         guard.trip(Trigger.RIG_LOST, "the rig's process has ended")
         return guard.state not in (GuardState.ARMED, GuardState.RETREATING)
 
     def _interrupted(self) -> bool:
-        """Return whether homing is to end: the rig sends nothing meanwhile but `close`, or its end is closed."""
+        """Return True if homing has to end: after SIGTERM, at the rig's end, or on `close`, the one message then."""
         return self.terminated or os.getppid() != self._parent or self._connection.poll(0)
 
     def _serve(self, timeout_s: float) -> None:
@@ -310,7 +310,7 @@ class _Server:
             self._rig_gone = True
 
     def _answer(self, what: str, given: Any) -> tuple[Any, ...]:
-        """Return a result or an error, and the samples, events and counts up to then."""
+        """Return a request's result or error, and the samples, events and counts since the last answer."""
         result: Any = None
         try:
             if what == "start":
@@ -355,7 +355,7 @@ def _log(entry: Mapping[str, Any]) -> None:
 
 
 def main() -> None:
-    """Run the process; its argument is the number of the connection's open socket."""
+    """Run the guard's process; its command-line argument is the file descriptor of the connection's socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     server = _Server(Connection(int(sys.argv[1])))

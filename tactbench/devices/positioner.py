@@ -1,4 +1,4 @@
-"""Anything that moves along or about one axis: a linear motor, a rail of a manipulator, a stage."""
+"""Base class of drivers for devices that move along or about one axis: linear motors, a manipulator's rails, stages."""
 
 from __future__ import annotations
 
@@ -21,116 +21,116 @@ from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 
 SILENT_S = 0.5
-"""Timeout for an answer of a controller (assumed)."""
+"""Timeout for an answer of a controller [s] (assumed)."""
 SETTLE_S = 0.5
-"""Time beyond that of a move by its speed and acceleration, after which the move has failed (assumed)."""
+"""Time added to the computed duration of a move, after which the move has failed [s] (assumed)."""
 HOMING_S = 60.0
-"""Timeout for homing (assumed)."""
+"""Timeout for homing [s] (assumed)."""
 HALTS = 2
-"""Number of halts before :meth:`Positioner.halt_harder` (assumed)."""
+"""Number of halt commands before :meth:`Positioner.halt_harder` is called (assumed)."""
 FASTER = 1.5
-"""Factor over its stated speed at which an axis may seem to move; two positions further apart are no move (assumed)."""
+"""Largest plausible ratio of an axis' apparent to its stated speed; a larger one means lost steps (assumed)."""
 
 
 class PositionerError(RigError):
-    """An axis or its controller does not carry out a command."""
+    """An axis or its controller has not carried out a command."""
 
 
 class PositionerSilentError(PositionerError):
-    """The controller does not answer; whether it has carried out the last command is not known."""
+    """The controller does not answer; it may or may not have carried out the last command."""
 
 
 class NotReadyError(PositionerError):
-    """The move is not allowed now, or at all; nothing was sent."""
+    """A move is not permitted at present, or never is; no command was sent."""
 
 
 @dataclass(frozen=True)
 class PositionerFacts:
-    """Properties that an axis states; positions in m (or rad), those of a pressing axis positive into the skin."""
+    """Stated properties of an axis; positions in m (or rad), those of a pressing axis positive into the skin."""
 
     limits: tuple[float, float]
-    """Least and greatest position, which the controller keeps as well; NaN: not stated, and it is never moved."""
+    """Least and greatest position, also enforced by the controller; NaN: not stated, and the axis is never moved."""
     resolution: float
-    """Least step."""
+    """Smallest step [m or rad]."""
     corridor: float
-    """Largest distance from its target at which a move ends."""
+    """Largest distance from its target at which a move may end [m or rad]."""
     speed: float
-    """Largest speed of a move."""
+    """Largest speed of a move [m/s or rad/s]."""
     acceleration: float
-    """Acceleration of braking."""
+    """Acceleration of braking [m/s^2 or rad/s^2]."""
     stop_latency_s: float
-    """Longest time from the call of :meth:`Positioner.halt` or :meth:`~Positioner.retreat` to the begin of braking."""
+    """Longest time from the call of :meth:`Positioner.halt` or :meth:`~Positioner.retreat` until braking begins."""
     interruptible: bool
-    """Whether `halt` and `retreat` end a move that is under way."""
+    """True if `halt` and `retreat` end a move under way; False if the controller completes every move."""
     holds_unpowered: bool
-    """Whether it keeps its place without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    """True if the axis keeps its place unpowered: horizontal, or with brake, counterweight or self-locking screw."""
     homes_here: bool = False
-    """Whether homing takes the present place for the home, even one in the skin."""
+    """True if homing takes the present place as home, even if the indenter is in the skin."""
     retreat: float = math.nan
-    """Position away from the skin; NaN: it retreats by a halt."""
+    """Position away from the skin to which the axis retreats [m or rad]; NaN: a retreat is only a halt."""
     retreat_speed: float = math.nan
 
     @property
     def near(self) -> float:
-        """Largest distance from a place that counts as being there."""
+        """Largest distance from a place at which the axis counts as being there [m or rad]."""
         return max(self.corridor, 2.0 * self.resolution)
 
     def seconds(self, distance: float, speed: float) -> float:
-        """Return the longest time of a move [s]."""
+        """Return the longest time that a move may take [s]."""
         return abs(distance) / speed + 2.0 * speed / self.acceleration + SETTLE_S
 
 
 @dataclass(frozen=True)
 class PositionerState:
-    """State of an axis, as its controller reported it."""
+    """State of an axis as reported by its controller."""
 
     t_ns: int
     """Time at which the position was received, on the host's clock."""
     position: float
     target: float = math.nan
-    """NaN: not known."""
+    """Commanded position; NaN: not known."""
     current_a: float = math.nan
-    """Without sign; NaN: not known."""
+    """Motor current without sign [A]; NaN: not known."""
     problem: str = ""
-    """Reported condition that must end a press (current limit, deviation); empty: none."""
+    """Reported condition that must end a press, such as current limit or deviation; empty: no such condition."""
 
 
 class PositionerOptions(Options):
-    """Options of any axis in a rig file; a subclass adds those of its controller."""
+    """Options of any axis in a rig file; a subclass adds the options of its controller."""
 
     lower_m: float | None = None
-    """Ends of travel, kept by the controller and by the driver; without them the axis can be read, not moved."""
+    """Ends of travel, enforced by controller and driver; without both the axis can be read, but not moved."""
     upper_m: float | None = None
     home_m: float = 0.0
-    """Position of the place that homing finds."""
+    """Position given to the place that homing finds [m]."""
     speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Speed of moves."""
+    """Speed of moves [m/s]."""
     acceleration_m_s2: float | None = Field(default=None, gt=0.0)
-    """Acceleration of starting and braking."""
+    """Acceleration at the start and at the end of a move [m/s^2]."""
     corridor_m: float | None = Field(default=None, gt=0.0)
-    """Distance from its target within which a move has ended: well below the shortest move."""
+    """Distance from its target within which a move has ended [m]: well below the shortest move."""
     retreat_m: float | None = None
-    """Position away from the sensor."""
+    """Position away from the sensor, for a retreat [m]."""
     retreat_speed_m_s: float | None = Field(default=None, gt=0.0)
     orientation: Literal["horizontal", "vertical"] | None = None
-    """Direction of the axis; this and, of a vertical one, the next two must be stated before anything presses."""
+    """Direction of the axis; needed before a press, for a vertical axis together with `brake` and `counterweight`."""
     brake: bool | None = None
-    """Whether a brake holds it without power."""
+    """True if a brake holds the axis without power."""
     counterweight: bool | None = None
-    """Whether a counterweight or spring holds it without power."""
+    """True if a counterweight or spring holds the axis without power."""
     peak_force_n: float | None = Field(default=None, gt=0.0)
-    """Largest force that its drive can exert: the last bound where the force sensor reads wrong values."""
+    """Largest force that the axis' drive can exert [N]: the only bound left if the force sensor reads wrong values."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         low, high = self.lower_m, self.upper_m
         if (low is None) != (high is None):
-            raise ValueError("give both lower_m and upper_m, or none")
+            raise ValueError("give both lower_m and upper_m, or neither")
         if low is not None and high is not None:
             if not low < high:
-                raise ValueError("lower_m is below upper_m")
+                raise ValueError("lower_m must be below upper_m")
             if self.retreat_m is not None and not low <= self.retreat_m <= high:
-                raise ValueError("retreat_m is between lower_m and upper_m")
+                raise ValueError("retreat_m must be between lower_m and upper_m")
         return self
 
     @property
@@ -140,31 +140,31 @@ class PositionerOptions(Options):
 
     @property
     def force_source(self) -> str:
-        """Source of :attr:`largest_force_n`; that of a subclass whose driver sends a limit is another."""
+        """Source of :attr:`largest_force_n`; a subclass whose driver sends a limit to its controller overrides it."""
         return "unknown" if self.largest_force_n is None else "declared"
 
     @property
     def holds_unpowered(self) -> bool:
-        """Whether it keeps its place without power; False where that is not known."""
+        """True if the axis keeps its place without power; False if this is not known."""
         return self.orientation == "horizontal" or bool(self.brake) or bool(self.counterweight)
 
     def homes_towards(self) -> int:
-        """Return the sign of the direction in which homing moves; 0: it does not move, or that is not known."""
+        """Return the sign of the direction in which homing moves; 0: no motion, or the direction is not known."""
         return 0
 
 
 class Positioner(Driver):
-    """Driver of one axis.
+    """Base class of the driver of one axis.
 
-    Only :meth:`home` and the moves let it move, and only :meth:`enable` and :meth:`home` give it power.
+    Only :meth:`home` and the moves move the axis, and only :meth:`enable` and :meth:`home` give it power.
     :meth:`home`, :meth:`enable` and :meth:`disable` return at their end, within a bound. :meth:`move_to`,
     :meth:`move_by`, :meth:`halt` and :meth:`retreat` return at once; :meth:`update` is called until :attr:`moving` is
     false. `halt` and `retreat` replace a move that is under way; the other moves are refused then.
 
     The call that detects a failure raises PositionerSilentError, another PositionerError, or a LinkError.
 
-    As a device of a rig an axis has one stream, `motor`: position, current and target, once per state that was read.
-    A subclass has the abstract methods and the class attributes. It calls :meth:`check_move` before it sends a move,
+    As a device of a rig an axis has one stream, `motor`: position, current and target, one row for each state read.
+    A subclass defines abstract methods and class attributes. It calls :meth:`check_move` before it sends a move,
     :meth:`begin` after, and :meth:`see` with each answer. A DeviceDescriptor's `driver` names the class itself.
     """
 
@@ -173,16 +173,16 @@ class Positioner(Driver):
     address: ClassVar[str] = "serial:///dev/ttyUSB0?baud=9600"
     options_kind: ClassVar[type[PositionerOptions]] = PositionerOptions
     resolution_m: ClassVar[float] = math.nan
-    """Least step."""
+    """Smallest step [m]."""
     stop_latency_s: ClassVar[float] = math.nan
-    """See :attr:`PositionerFacts.stop_latency_s`; likewise the next."""
+    """Longest time until braking begins [s], and True if a halt ends a move under way: see :class:`PositionerFacts`."""
     interruptible: ClassVar[bool] = True
     stream = "motor"
 
     def __init__(self, settings: DriverSettings) -> None:
         self.facts = self.facts_of(read_options(self.options_kind, settings.options, self.device))
         self.state: PositionerState | None = None
-        """The last state; None: none was read yet."""
+        """State read last; None: no state was read yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
         self._goal, self._nearest, self._due_ns, self._halts, self._fastest = math.nan, math.inf, 0, 0, 0.0
@@ -190,16 +190,16 @@ class Positioner(Driver):
         self._rest = self._came = b""
         self._asked_ns: int | None = None
         self._read_ns = 0
-        """Time at which lines were last read."""
+        """Time at which lines were last read [ns]."""
         super().__init__(settings)
         self.homed = False
-        """Whether positions are known, and limits hold."""
+        """True if the axis is homed: positions are known and ends of travel enforced."""
         self.enabled = False
-        """Whether it has power, as far as is known."""
+        """True if the axis has power, as far as is known."""
 
     @classmethod
     def facts_of(cls, options: Any) -> PositionerFacts:
-        """Return the properties of an axis with these options; nothing is opened."""
+        """Return the properties of an axis with these options, without opening its link."""
         return PositionerFacts(
             limits=(_or(options.lower_m, math.nan), _or(options.upper_m, math.nan)),
             resolution=cls.resolution_m,
@@ -217,65 +217,65 @@ class Positioner(Driver):
 
     @abstractmethod
     def home(self, stop: Callable[[], bool] = lambda: False) -> None:
-        """Find the place that positions count from, and set the ends of travel; it has power afterwards.
+        """Find the origin of positions, and set the ends of travel; afterwards the axis has power.
 
         Parameters
         ----------
         stop
-            Called repeatedly while it moves; true: halt at once and raise PositionerError.
+            Function called repeatedly while homing; if it returns true, halt at once and raise PositionerError.
         """
 
     def enable(self) -> None:
-        """Give it power; it holds its place. A subclass sends the command, if there is one."""
+        """Give the axis power; it holds its place. A subclass sends the command, if its controller has one."""
         self.enabled = True
 
     @abstractmethod
     def disable(self) -> None:
-        """Take its power. Where :attr:`PositionerFacts.holds_unpowered` is false it may fall."""
+        """Switch the axis' power off. It may fall if :attr:`PositionerFacts.holds_unpowered` is false."""
 
     @abstractmethod
     def move_to(self, position: float, speed: float | None = None) -> float:
-        """Begin to move to a position, to the nearest step, which is returned; None: at the speed of the facts."""
+        """Begin a move to the step nearest to a position; return its position. Speed None: that of the facts."""
 
     @abstractmethod
     def halt(self) -> None:
-        """Begin to brake and hold; this replaces any move."""
+        """Begin to brake, then hold; this replaces any move."""
 
     def halt_harder(self) -> None:
-        """Halt by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is none."""
-        raise PositionerError(f"It was halted {HALTS} times, and goes on.", hint="Cut its supply.")
+        """Halt by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is no such means."""
+        raise PositionerError(f"The axis was halted {HALTS} times, and still moves.", hint="Cut its power supply.")
 
     @abstractmethod
     def update(self, timeout_s: float = 0.0) -> None:
         """Read the state and continue moves, waiting at most `timeout_s` for the controller."""
 
     def retreat(self) -> None:
-        """Halt, and at rest move to the place away from the skin, if there is one; this replaces any move."""
+        """Halt, then move to the place away from the skin, if one is stated; this replaces any move."""
         self.halt()
         self._retreats = math.isfinite(self.facts.retreat)
 
     def find_home(self) -> bool:
-        """Return whether the controller is homed already, after a restart of this program; set :attr:`homed` then.
+        """Return True if the controller is still homed after a restart of this program, and set :attr:`homed`.
 
-        False here; a subclass queries its controller.
+        The base class returns False; a subclass queries its controller.
         """
         return False
 
     def confirm(self) -> None:
-        """Read back the limits that the controller must keep; raises PositionerError if it has others."""
+        """Read back the limits that the controller enforces; raises PositionerError if they differ from the options."""
 
     def rescue(self, within_s: float | None) -> float:
-        """Retreat with a controller that another process had, without set-up or homing; return the last position.
+        """Retreat with a controller set up by another process, without set-up or homing; return the last position.
 
         Parameters
         ----------
         within_s
-            Timeout for the way; None: halt at once, at any place.
+            Timeout for the retreat [s]; None: only halt, at any place.
 
         Raises
         ------
         PositionerError, LinkError
-            If it does not come to its place of retreat, or does not answer.
+            If the axis does not reach its place of retreat, or the controller does not answer.
         """
         self.homed = self.enabled = True
         if within_s is None:
@@ -295,9 +295,9 @@ class Positioner(Driver):
     # Calls of a subclass ----------------------------------------------------------------------------------------------
 
     def begin(self, target: float = math.nan, speed: float | None = None) -> None:
-        """Note that a move to a target was sent, at a speed (None: that of the facts), and set its deadline.
+        """Register a move to a target that was sent, at a speed (None: that of the facts), and set its deadline.
 
-        The deadline is the time of the way, and is extended while the axis comes nearer. The target NaN stands for a
+        The deadline is the end of the way, and is extended while the axis comes nearer. The target NaN stands for a
         halt, infinity for homing, until the next call of this method.
         """
         facts, halted = self.facts, math.isnan(target)
@@ -320,11 +320,11 @@ class Positioner(Driver):
         current_a: float = math.nan,
         problem: str = "",
     ) -> None:
-        """Note an answer: its time, the position, whether the controller reports that the axis is idle, and the rest.
+        """Register an answer: its time, the position, `idle` as the controller reports it, and other values.
 
-        A move ends when the axis is idle at its target; an idle axis elsewhere has not begun. A halt ends when it is
-        idle and the position is that of the answer before. A homed axis that moves on after the time of braking is
-        halted again.
+        A move ends when the axis is idle at its target; an idle axis elsewhere has not begun to move. A halt ends when
+        the axis is idle and its position equals that of the answer before. A homed axis that moves on after the time of
+        braking is halted again.
         """
         last, halted, facts = self.position, math.isnan(self._goal), self.facts
         if target is None:
@@ -343,9 +343,9 @@ class Positioner(Driver):
             self._retreats = retreats
 
     def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
-        """Send a question on a ByteLink, unless an answer is outstanding; return the lines received.
+        """Send a query on a ByteLink, unless an answer is outstanding; return the lines received.
 
-        The caller calls :meth:`answered` after the answer. An empty question is not sent, and has no answer. Raises
+        The caller calls :meth:`answered` after the answer. An empty query is not sent, and has no answer. Raises
         PositionerSilentError if an answer takes longer than `SILENT_S`.
         """
         unread_s = 1e-9 * (self.clock() - self._read_ns)
@@ -361,18 +361,18 @@ class Positioner(Driver):
         if self._asked_ns is not None and self.clock() - self._asked_ns > 1e9 * patience_s:
             self._asked_ns = None
             raise PositionerSilentError(
-                f"{self.device} does not answer {question!r}; the last that came is {self._came!r}.",
-                hint=f"Check the port, its baud rate, and that this is the controller that the driver is for. "
+                f"{self.device} does not answer {question!r}; the last line received is {self._came!r}.",
+                hint=f"Check the port, its baud rate, and that the driver is for this controller. "
                 f"{self.link.silence_hint}",
             )
         return lines
 
     def answered(self) -> None:
-        """Note that the answer was received: the next call of :meth:`lines` sends its question."""
+        """Register that the answer was received: the next call of :meth:`lines` sends its query."""
         self._asked_ns = None
 
     def finish(self, stop: Callable[[], bool]) -> None:
-        """Wait for the end of a move; halts and raises PositionerError if `stop` returns true, or it lasts too long."""
+        """Wait for the end of a move; halt and raise PositionerError if `stop` returns true or it takes too long."""
         while self.moving:
             self.update(0.05)
             self._end_in_time()
@@ -381,19 +381,19 @@ class Positioner(Driver):
                 raise PositionerError("The axis was halted.")
 
     def _end_in_time(self) -> None:
-        """Raise PositionerError for a move that has not ended in its time; :meth:`see` repeats halts."""
+        """Raise PositionerError for a move that has not ended by its deadline; :meth:`see` repeats halts."""
         if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
             self._due_ns = self.clock() + round(1e9 * SETTLE_S)
             raise PositionerError(
-                f"It has not come {'home' if math.isinf(self._goal) else f'to {self._goal:g}'} in its time, and is at "
+                f"It has not reached {'its home' if math.isinf(self._goal) else f'{self._goal:g}'} in time, and is at "
                 f"{self.position:g}.",
-                hint="See what is in its way, and whether units and speed in the rig file are the controller's.",
+                hint="Check what is in its way, and that units and speed in the rig file are those of the controller.",
             )
 
     def note(self, state: PositionerState) -> None:
-        """Store a state that was read.
+        """Store a state read from the controller.
 
-        A position further from the last one than it can have moved since is ignored once.
+        A position further from the last position than the axis can have moved is ignored once.
 
         Raises
         ------
@@ -415,23 +415,23 @@ class Positioner(Driver):
         if far and last is not None:
             self.homed = False
             raise PositionerError(
-                f"Its position has gone from {last.position:g} to {state.position:g}, faster than it moves: it has "
-                "lost its place, or was started anew.",
-                hint="See that nothing is touched, and home it anew.",
+                f"The position has gone from {last.position:g} to {state.position:g}, faster than it can move: it has "
+                "lost its place, or was restarted.",
+                hint="Check that nothing is touched, and home the axis again.",
             )
 
     def check_move(self, position: float) -> None:
-        """Raise NotReadyError unless a move to a position may begin now."""
+        """Raise NotReadyError unless a move to a position [m] may begin now."""
         low, high = self.facts.limits
         for wrong, problem, hint in (
             (self.moving, "The axis is moving.", "Wait for the end of its move, or let it retreat."),
             (not self.homed, "The axis is not homed.", "Use home()."),
-            (math.isnan(low), "The axis has no ends of travel.", "Give them in the rig file."),
+            (math.isnan(low), "The axis has no ends of travel.", "Give lower_m and upper_m in the rig file."),
             (not self.enabled, "The axis has no power.", "Use enable()."),
             (
                 not low - 1e-12 <= position <= high + 1e-12,
                 f"{position:g} m is beyond the ends of travel, {low:g} to {high:g} m.",
-                "Ask for less.",
+                "Choose a target between these.",
             ),
         ):
             if wrong:
@@ -441,27 +441,27 @@ class Positioner(Driver):
 
     @property
     def moving(self) -> bool:
-        """Whether a move is under way, by the last state."""
+        """True if a move is under way, by the last state read."""
         return self._moving
 
     @property
     def position(self) -> float:
-        """The last position; NaN: not read yet."""
+        """Position read last; NaN: not read yet."""
         return math.nan if self.state is None else self.state.position
 
     def move_by(self, distance: float) -> float:
-        """Begin to move from the last target by a distance, to the nearest step; return the new target."""
+        """Begin a move by a distance [m] from the last target, to the nearest step; return the new target."""
         if self.state is None or math.isnan(self.state.target):
-            raise NotReadyError("The axis does not know its target.", hint="Read it once it is at rest.")
+            raise NotReadyError("The axis' target is not known.", hint="Read its state once it is at rest.")
         return self.move_to(self.state.target + distance)
 
     def at(self, position: float) -> bool:
-        """Return whether its last position is a given one."""
+        """Return True if the last position is `position`, within :attr:`PositionerFacts.near`."""
         return abs(self.position - position) <= self.facts.near
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The stream `motor`, at the rate that the line allows."""
+        """The stream `motor`, at the rate that the serial line permits."""
         channels = (
             ChannelSpec(name="position", kind="position", unit="m"),
             ChannelSpec(name="current", kind="other", unit="A"),
@@ -470,11 +470,11 @@ class Positioner(Driver):
         return (StreamSpec(name=self.stream, channels=channels),)
 
     def start(self) -> None:
-        """Read the state once; a subclass sets its controller up first."""
+        """Read the state once; a subclass first sets its controller up."""
         self.update(0.0)
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the states that were read since the last call, and continue moves; raises as :meth:`update`."""
+        """Return the states read since the last call, and continue moves; raises the errors of :meth:`update`."""
         until_ns = self.clock() + round(1e9 * timeout_s)
         self.update(timeout_s)
         self._end_in_time()
@@ -489,7 +489,7 @@ class Positioner(Driver):
         return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]
 
     def stop(self) -> None:
-        """Drop unread states. The axis ends its move, and holds."""
+        """Drop unread states. The axis completes its move, and holds."""
         self._unread = []
 
 

@@ -1,13 +1,13 @@
-"""One press as a state machine, stepped once a control period with the guard's report; it never waits.
+"""One press as a state machine, advanced in each control period by the guard's report; its code never waits.
 
 ::
 
     approach -> contact -> lift -> unloaded -> return -> ramp -> unload -> done
     any of them -> retreat -> failed
 
-The surface is found first: a quick move to a place above it, a slow one until the raw force shows a touch, then a small
-force for a while. From there the motor lifts the indenter off for the scene's unloaded hold, returns, and follows the
-scene's profile. Touch is detected on the raw force; the force is regulated on the filtered one. The guard checks the
+The surface is found first: a fast move to a place above it, a slow move until the raw force shows a touch, then a small
+force for a while. Then the motor lifts the indenter off for the scene's unloaded hold, returns, and follows the force
+profile. Touch is detected on the raw force; the force is regulated on the filtered one. The guard checks the
 raw force independently, and retreats independently.
 
 Place and force must agree (derived; k is a stiffness, x a way into the skin):
@@ -34,67 +34,67 @@ from tactbench.devices.force_loop import ForceController, ForceLaw
 from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
 
 OFF_S = 1.0
-"""Longest time of the force outside the error band, less half of the time inside it, so that a swing counts."""
+"""Longest time of the force outside the error band [s], less half of the time inside, so that oscillations count."""
 OFF_SKIN_S = 2.0
-"""Longest time from lifting off until the mean force is zero: a skin recovers (assumed)."""
+"""Longest time from lifting off until the mean force is zero [s]: a skin recovers slowly (assumed)."""
 MOST_PERIODS = 3
-"""Most periods that a step of the force law counts where the program stood still."""
+"""Largest number of control periods in one step of the force law after the program was held up."""
 
 
 class PressState(StrEnum):
-    """State of a press."""
+    """State of a press, in the usual order."""
 
     APPROACH = "approach"
-    """Until the skin is touched."""
+    """Moving towards the skin until it is touched."""
     CONTACT = "contact"
-    """Under a small force."""
+    """In contact, holding a small force."""
     LIFT = "lift"
     UNLOADED = "unloaded"
-    """Just above the skin, for the scene's unloaded hold."""
+    """At rest just above the skin, for the scene's unloaded hold."""
     RETURN = "return"
     RAMP = "ramp"
     UNLOAD = "unload"
     DONE = "done"
-    """Just above the skin again."""
+    """Ended: just above the skin again."""
     RETREAT = "retreat"
     FAILED = "failed"
-    """The motor is out; :attr:`Press.ended` is the reason."""
+    """Ended: the motor has retreated; :attr:`Press.ended` is the reason."""
 
 
 @dataclass(frozen=True)
 class PressPlan:
-    """The numbers of a press, in m, N and s."""
+    """The numbers of all presses of a rig, in m, N and s."""
 
     law: ForceLaw
-    """The force law, in m."""
+    """The force law, with lengths in m."""
     resolution_m: float
-    """Resolution of the axis: shorter steps are not sent, and added to later ones."""
+    """Resolution of the axis: shorter steps are not sent, but added to later steps."""
     step_m: float
-    """Largest increment of a control period."""
+    """Largest increment in one control period."""
     near_m: float
-    """Place above any surface, at which the axis changes to the speed of touching."""
+    """Position above any possible surface, at which the axis slows down to `touch_speed_m_s`."""
     found_m: float
-    """Place below any surface, until which the softest skin must have been touched."""
+    """Position below any possible surface, at which even the softest skin must have been touched."""
     speed_m_s: float
-    """Speed to `near_m`."""
+    """Speed of the approach down to `near_m`."""
     touch_speed_m_s: float
-    """Speed from there on."""
+    """Speed from `near_m` until the touch."""
     unload_speed_m_s: float
     mean_n: float
-    """Largest mean of the newest `mean_count` raw forces without touch; the guard halts at single forces."""
+    """Largest mean of the newest `mean_count` raw forces that is no touch; the guard itself tests single forces."""
     mean_count: int
     softest_n_m: float
-    """Least force per way into any skin, from the touch on."""
+    """Least stiffness of any skin from the touch on: force per way into the skin."""
     stiffest_n_m: float
-    """Greatest force per way into any skin."""
+    """Greatest stiffness of any skin: force per way into the skin."""
     contact_n: float
-    """Force after the touch until the surface is known; and the least force on the ramp."""
+    """Force held after the touch until the surface is known, and least force on the ramp."""
     settle_s: float
-    """Time under that force."""
+    """Time for which `contact_n` is held."""
     lift_m: float
-    """Way back from there for the unloaded hold."""
+    """Way back from the contact for the unloaded hold."""
     error_band_n: float
-    """Largest difference of the filtered force from the wanted one; the press ends after `OFF_S` beyond it."""
+    """Largest difference of filtered and wanted force; the press ends after `OFF_S` of larger differences."""
 
 
 @dataclass(frozen=True)
@@ -102,22 +102,22 @@ class Course:
     """Force profile of a scene."""
 
     setpoint_n: Callable[[float], float]
-    """Function from a second since the scene's first sample to the force."""
+    """Function from the time since the scene's first sample [s] to the wanted force [N]."""
     slope_n_s: float
-    """Slope of the ramp."""
+    """Slope of the ramp [N/s]."""
     ramp_s: float
-    """Second at which the ramp begins."""
+    """Time at which the ramp begins [s]."""
     end_s: float
-    """Second at which it ends."""
+    """Time at which the ramp ends [s]."""
 
 
 class Press:
-    """One press of one scene.
+    """Press of one scene, from approach to unloading.
 
     Parameters
     ----------
     plan
-        Numbers of the rig.
+        Numbers of the rig for a press.
     course
         Force profile of the scene.
 
@@ -126,13 +126,13 @@ class Press:
     state
         State of the press.
     ended
-        Reason of the failure; empty: none.
+        Reason of the failure; empty: no failure.
     not_out
-        Instruction to an operator where the motor did not come out; empty: it did.
+        Instruction to an operator if the motor has not retreated; empty: no instruction.
     contact_m
-        Position of the motor under the small force; NaN: not reached yet.
+        Position of the motor under the small contact force [m]; NaN: not reached yet.
     touch_n
-        Largest raw force from the first touch until that position was known.
+        Largest raw force [N] from the first touch until `contact_m` was known.
     """
 
     def __init__(self, plan: PressPlan, course: Course) -> None:
@@ -160,42 +160,42 @@ class Press:
 
     @property
     def ready(self) -> bool:
-        """Whether the surface is found, and the scene may begin."""
+        """True if the surface is found and the scene may begin."""
         return self.state is PressState.UNLOADED
 
     @property
     def over(self) -> bool:
-        """Whether the press has ended."""
+        """True if the press has ended."""
         return self.state in (PressState.DONE, PressState.FAILED)
 
     def begin(self, now_s: float) -> None:
-        """Let the scene begin: its seconds count from now on."""
+        """Let the scene begin: its time counts from `now_s`."""
         self._began_s = now_s
 
     def fail(self, why: str) -> None:
-        """Let the motor retreat for a reason; the first one is kept."""
+        """Let the motor retreat for a reason; of several reasons the first is kept."""
         if not self.over and self.state is not PressState.RETREAT:
             self.ended = why
             self._enter(PressState.RETREAT, self._since_s)
 
     def abandon(self) -> None:
-        """End the press without a retreat: it is not stepped any longer."""
+        """End the press without a retreat, when no more steps follow."""
         if not self.over:
             self._enter(PressState.FAILED, self._since_s)
 
     # Stepping ---------------------------------------------------------------------------------------------------------
 
     def step(self, report: Report, raw: Sequence[float], now_s: float) -> Beat:
-        """Go on by one control period.
+        """Advance the press by one control period; return the beat for the guard.
 
         Parameters
         ----------
         report
-            Last answer of the guard.
+            Last report of the guard.
         raw
             Raw pressing forces [N] since the last step, less the zero.
         now_s
-            Second of the rig's clock.
+            Time of the rig's clock [s].
         """
         self._take(raw, report.position_m)
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
@@ -216,7 +216,7 @@ class Press:
         return self._pending(report, now_s)
 
     def _take(self, raw: Sequence[float], position_m: float) -> None:
-        """Store the newest raw forces with the place of the axis, and the largest force of a touch."""
+        """Store the newest raw forces, the axis' position, and the largest force of the touch."""
         self._raw.extend(raw)
         self._places.extend([position_m] * len(raw))
         if raw:
@@ -226,7 +226,7 @@ class Press:
 
     @property
     def mean_n(self) -> float:
-        """Mean of the newest `mean_count` raw forces [N]; NaN: fewer have come yet."""
+        """Mean of the newest `mean_count` raw forces [N]; NaN: fewer received so far."""
         return fmean(self._raw) if len(self._raw) == self._raw.maxlen else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
@@ -250,7 +250,7 @@ class Press:
         self._requested_s = None
 
     def _pending(self, report: Report, now_s: float) -> Beat:
-        """Return the pending move, until the guard has accepted it; a stop at once."""
+        """Return the pending move until the guard accepts it; a stop is returned at once."""
         if self._goal is None or self._requested_s is not None:
             return Beat()
         if report.moving and self._goal.command is not CommandKind.STOP:
@@ -259,7 +259,7 @@ class Press:
         return self._goal
 
     def _arrived(self, report: Report, now_s: float) -> bool:
-        """Return whether the last move is over; one that was not accepted is sent again."""
+        """Return True if the last move has ended; a move that was not accepted is sent again."""
         if self._goal is None or self._requested_s is None or now_s <= self._requested_s:
             return False
         if not report.accepted:
@@ -280,8 +280,8 @@ class Press:
             read_n = report.force_n if report.touched else mean_n
             at_mm, near_mm = 1e3 * report.position_m, 1e3 * plan.near_m
             self.fail(
-                f"the force reads {read_n:.2f} N at {at_mm:.3f} mm, before {near_mm:.3f} mm, where the surface can be: "
-                "something is in the way, the motor's place is wrong, or the zero was taken under load"
+                f"the force reads {read_n:.2f} N at {at_mm:.3f} mm, before any surface, at {near_mm:.3f} mm: "
+                "something is in the way, the motor's position is wrong, or the zero was taken under load"
             )
         elif touched:
             # The guard has halted the axis at single forces; at a mean it is halted from here.
@@ -291,10 +291,10 @@ class Press:
             if not slowly:
                 self._move(plan.found_m, plan.touch_speed_m_s)
             else:
-                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, where the surface is by the rig file")
+                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, below the surface of the rig file")
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
-        """Enter the next state at the end of a move; on the way back to the skin also at a touch."""
+        """Enter the next state at the end of a move; when returning to the skin, also at a touch."""
         if not (self._arrived(report, now_s) or (self.state is PressState.RETURN and report.touched)):
             return
         if report.moving:
@@ -341,7 +341,7 @@ class Press:
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
         if self.state is PressState.CONTACT:
             if report.position_m > plan.found_m + plan.step_m:
-                self.fail(f"the force kept after the touch is not found down to {1e3 * report.position_m:.3f} mm")
+                self.fail(f"the contact force was not reached down to {1e3 * report.position_m:.3f} mm")
                 return Beat(command=CommandKind.RETREAT)
             if now_s - self._since_s >= plan.settle_s:
                 self.contact_m = controller.target
@@ -360,20 +360,20 @@ class Press:
         return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
     def _within_limits(self, filtered_n: float, passed_s: float) -> bool:
-        """Return whether force and place are within their limits; fail else."""
+        """Return True if force and position agree with each other and with the setpoint; else let the press fail."""
         plan = self._plan
         self._agree(self.mean_n, fmean(self._places) if self._places else math.nan)
         off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
         self._off_s = max(0.0, self._off_s + (passed_s if off else -0.5 * passed_s))
         if self._off_s >= OFF_S:
-            self.fail(f"the force was off by more than {plan.error_band_n:g} N, at {self.setpoint_n:.2f} N")
+            self.fail(f"the force was off the wanted {self.setpoint_n:.2f} N by more than {plan.error_band_n:g} N")
         return not self.ended
 
     def _agree(self, force_n: float, place_m: float) -> None:
-        """Fail unless the force has grown with the way as declared skins allow, from every place on this way in.
+        """Fail unless the force has grown with depth as the declared stiffnesses allow, from each place on this way in.
 
-        `_way` has for each of these places: the place, and over it and those before the largest force above the softest
-        skin's, and the least above the stiffest's. Force and place are means of the same time.
+        `_way` has for each of these places: position; up to there the largest force less the softest skin's, and the
+        least force less the stiffest skin's. Force and position are means over the same time.
         """
         plan, way = self._plan, self._way
         if math.isnan(force_n) or place_m < self.contact_m:
@@ -382,7 +382,7 @@ class Press:
             way.pop()
         soft_n, stiff_n = force_n - plan.softest_n_m * place_m, force_n - plan.stiffest_n_m * place_m
         _, most_n, least_n = way[-1] if way else (place_m, soft_n, stiff_n)
-        lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not respond"
+        lacking = "less than on the softest declared skin: contact was lost, or the force sensor does not respond"
         excessive = "more than on the stiffest declared skin: the zero drifts, or something else is touched"
         for wrong_n, text in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
             if wrong_n > 2 * plan.mean_n:

@@ -1,4 +1,4 @@
-"""The force sensor of a rig as it is recorded: its pressing channel, and its zero."""
+"""The force sensor of a rig as recorded: selection and sign of its pressing channel, and its zero."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from tactbench.core.samples import Block, FloatArray
 
 LEAST_ROWS = 10
-"""Least number of rows of a zero."""
+"""Least number of rows from which a zero is computed."""
 STRETCHES = 30
-"""Number of stretches of a zero whose means show the scatter."""
+"""Number of parts of a zero's rows whose means are compared to estimate the scatter."""
 STRETCH_S = 0.02
-"""Time over which noise may be correlated (assumed: a held sample of 50 Hz). A zero below 0.6 s has no drift test."""
+"""Time of correlated noise [s] (assumed: a held sample of 50 Hz). A zero below 0.6 s has no drift test."""
 MOST_BAD = 0.1
-"""Largest share of rows of a zero that are no numbers or marked (assumed)."""
+"""Largest part of a zero's rows that may be marked as bad or not finite (assumed)."""
 _PRESSED = "normal"
-"""Name of the pressing channel where it is not plain `fz`; tasks look for either."""
+"""Name of the pressing channel if it is not simply `fz`; tasks accept both names."""
 
 
 class PressingForce:
-    """The force sensor of a rig as it is recorded: pressing makes the channel of the rig file's `entry` rise.
+    """The force sensor of a rig as recorded: the channel of the rig file's `entry`, rising when pressed.
 
     Attributes
     ----------
@@ -36,12 +36,12 @@ class PressingForce:
     stream, column, sign
         Stream and column of the pressing force, and 1 or -1: pressing makes the device's channel rise or fall.
     zero
-        (channels,) zero of that stream; 0 until it is taken.
+        (channels,) zero of this stream; 0 until :meth:`take_zero`.
 
     Raises
     ------
     UsageError
-        If there is no such channel.
+        If the force sensor lacks the channel.
     """
 
     def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
@@ -67,15 +67,15 @@ class PressingForce:
         self.streams = tuple(pressed if one is stream else one for one in streams)
 
     def take_zero(self, blocks: Iterable[Block]) -> None:
-        """Set the zero of every channel of the stream: the mean of `blocks`, which were read without load.
+        """Set the zero of every channel of the stream to its mean in `blocks`, read without load.
 
         Every channel of unit N is tested: the size of its mean, its spread, its drift (the last third's mean less the
-        first's). Rows that are no numbers or are marked are counted and left out.
+        first's). Rows that are not finite or marked are counted and left out.
 
         Raises
         ------
         RigError
-            If the sensor is not at rest, or a tenth of its rows are no numbers, or fewer than ten come.
+            If the sensor is not at rest, or a tenth of its rows are marked or not finite, or it sends fewer than ten.
         """
         import numpy as np
 
@@ -89,22 +89,22 @@ class PressingForce:
         ]
         rows = np.concatenate([np.empty((0, self.zero.size)), *own])
         good = np.isfinite(rows).all(axis=1)
-        self._counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them no numbers or marked"
+        self._counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them not finite or marked"
         if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
-            hint = "Look at the force sensor: `tactbench doctor` reads it."
-            raise RigError(f"The force has no zero: {self._counted}.", hint=hint)
+            hint = "Check the force sensor with `tactbench doctor`."
+            raise RigError(f"The force has no zero, too few good rows: {self._counted}.", hint=hint)
         rows = rows[good]
         wrong = [text for place, name in self._forces.items() for text in self._at_rest(name, rows[:, place])]
         if wrong:
             raise RigError(
                 f"The force sensor is not at rest, and its zero is refused: {'; '.join(wrong)} ({self._counted}).",
-                hint="Take hands and loads off and start again; else bias the sensor, or state its range_n, noise_n "
-                "and largest_zero_n under `force:`.",
+                hint="Take hands and loads off and start again; else bias the sensor, or correct its range_n, noise_n "
+                "or largest_zero_n under `force:`.",
             )
         self.zero = rows.mean(axis=0)
 
     def _at_rest(self, name: str, values: FloatArray) -> Iterator[str]:
-        """Yield the problems of one channel's readings without load."""
+        """Yield the problems in one channel's readings without load: mean, spread and drift."""
         import numpy as np
 
         entry, third = self._entry, len(values) // 3
@@ -120,17 +120,17 @@ class PressingForce:
             found.append(("drift", drift, max(0.01 * entry.range_n, 5 * deviation)))  # one zero in ten thousand
         for what, value, most in found:
             if abs(value) > most:
-                yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
+                yield f"{name} has a {what} of {value:.3g} N, permitted are {most:.3g} N"
 
     def about(self) -> dict[str, Scalar]:
-        """Return facts for a recording: the mounting, and the zero."""
+        """Return facts for a recording: the pressing channel with its sign, and the zeros."""
         about: dict[str, Scalar] = {f"zero of {self.stream}": ", ".join(f"{value:.6g}" for value in self.zero)}
         if not self._plain:
             about["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
         return {**about, **({f"zero rows of {self.stream}": self._counted} if self._counted else {})}
 
     def turned(self, block: Block) -> Block:
-        """Return a block; one of the stream less the zero, with the pressing force positive when pressing."""
+        """Return a block; in blocks of the stream the zero is subtracted, and the force is positive when pressing."""
         if block.stream != self.stream:
             return block
         data = block.data - self.zero

@@ -1,4 +1,4 @@
-"""Several devices read at once: a thread a driver in real time, one after the other in virtual time."""
+"""Reading of several devices: in real time by one thread for each driver, in virtual time one after the other."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
 QUEUE_S = 5.0
-"""Length of the data that a queue holds [s]."""
+"""Capacity of a queue, as duration of its data [s]."""
 UNRATED_HZ = 10_000.0
-"""Rate of a stream that states none (assumed: above that of any tactile sensor)."""
+"""Assumed rate of a stream without a stated rate [Hz]: above that of any tactile sensor."""
 BLOCK_S = 0.05
-"""Time between two blocks of a stream [s]; of a slower caller a block holds all rows since the last."""
+"""Time between two blocks of a stream [s]; if the caller is slower, a block has all rows since the last block."""
 READ_S = 0.05
-"""Longest wait of one read, after which a reader checks whether it is to stop."""
+"""Longest wait of one read [s], after which a reader checks for a request to stop."""
 STEP_S = 0.02
-"""Virtual time between two reads of a device, so that the buffers of its link do not overflow (derived: the usual 256
+"""Virtual time between reads of a device [s], so that the buffers of its link do not overflow (derived: the usual 256
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
-"""Timeout for the end of a reader (assumed: a read and a stop, each within its link's timeouts)."""
+"""Timeout for the end of a reader [s] (assumed: a read and a stop, each within its link's timeouts)."""
 
 
 class StreamQueue:
     """Bounded queue of one stream's blocks between driver and caller, first in, first out.
 
     :meth:`put` never waits for room: a block that does not fit is dropped whole, its rows are counted, and the next row
-    that gets in is marked with :attr:`~tactbench.core.samples.Quality.GAP`. So the newest are lost, and every hole in
-    the rows is marked. One thread puts, another takes.
+    that gets in is marked with :attr:`~tactbench.core.samples.Quality.GAP`. So the newest rows are lost, and every
+    gap in the rows is marked. One thread puts, another takes.
 
     Attributes
     ----------
     check
-        Order and losses of the rows by their numbers.
+        Check of the rows' numbers for lost, late and duplicated rows.
     received_ns
-        Time at which the last block was put.
+        Time at which the last block was put [ns].
     written, dropped
-        Number of rows that were taken, and that did not fit.
+        Number of rows taken, and of rows dropped for lack of room.
     """
 
     def __init__(self, device: str, spec: StreamSpec) -> None:
@@ -62,7 +62,7 @@ class StreamQueue:
         self._lock = threading.Lock()
 
     def put(self, block: Block, now_ns: int) -> None:
-        """Add the new rows of a block; raises RigError if it has other columns than the first one."""
+        """Add the new rows of a block; raises RigError if its columns differ from those of the first block."""
         kept = self.check(block)
         if kept is None:
             return
@@ -73,8 +73,8 @@ class StreamQueue:
         self._layout = self._layout or layout
         if layout != self._layout or any(one is not None and len(one) != rows for one in columns):
             raise RigError(
-                f"A block of stream {block.stream!r} does not fit the first one.",
-                hint="Correct the driver: all blocks of a stream have the same columns, and one of each a row.",
+                f"A block of stream {block.stream!r} differs from the first block.",
+                hint="Correct the driver: all blocks of a stream need the same columns, with one value per row.",
             )
         with self._lock:
             self.received_ns = now_ns
@@ -89,7 +89,7 @@ class StreamQueue:
             self._rows += rows
 
     def take(self) -> Iterator[Block]:
-        """Remove all blocks and yield them as one, if there are any."""
+        """Remove all blocks and yield them joined to one block, if there are any."""
         with self._lock:
             found, self._blocks, self._rows = self._blocks, [], 0
         if found:
@@ -98,7 +98,7 @@ class StreamQueue:
             yield joined if np.any(joined.quality) else replace(joined, quality=None)
 
     def discard(self) -> None:
-        """Drop all rows, which are not taken any more."""
+        """Drop all rows, as the reading has ended."""
         with self._lock:
             self._drop(self._rows)
             self._blocks, self._rows = [], 0
@@ -109,23 +109,23 @@ class StreamQueue:
 
 
 class Reading:
-    """Context in which devices are read: it starts them, yields their blocks and stops them; for one use.
+    """Context that starts several devices, yields their blocks and stops them; for one use.
 
-    In real time a thread reads each driver and puts its rows into a bounded queue a stream; a caller who takes them too
-    slowly loses the newest, which is counted and marked (:class:`StreamQueue`). In virtual time there are no threads,
+    In real time one thread for each driver puts its rows into a bounded queue for each stream; a caller that takes rows
+    too slowly loses the newest, as counted and marked (:class:`StreamQueue`). In virtual time there are no threads,
     and the caller cannot be too slow. The same data of the devices make the same rows in both; where blocks begin
     differs. No row is trimmed to the duration. Drivers are neither opened nor closed here.
 
     Parameters
     ----------
     drivers
-        By the device's name in messages. Their streams have different names.
+        Drivers by the device's name in messages. All streams need different names.
     clock
-        The host's, the same as the drivers'.
+        Clock of the host [ns], the same as the drivers'.
     advance
-        For virtual time: advances `clock` to a nanosecond, and emulated devices with it. None: real time.
+        Function that advances virtual time, and emulated devices, to a time of `clock` [ns]. None: real time.
     silent_s
-        Longest time without a block of a stream that states a rate; a longer one ends the reading.
+        Longest time without a block of a stream with a stated rate [s]; after a longer time the reading ends.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Reading:
         self._over = threading.Event()
         self._lock = threading.Lock()
         self.ended = ""
-        """Name of the device that ended the reading, and the reason; empty: none did."""
+        """Name of the device that ended the reading, and the reason; empty: no device did."""
 
     def __enter__(self) -> Self:
         try:
@@ -156,9 +156,9 @@ class Reading:
                 driver.start()
                 for spec in driver.streams:
                     if spec.name in self._streams:
-                        hint = "Streams of one recording have different names."
+                        hint = "Rename one of these streams."
                         raise UsageError(
-                            f"The stream {spec.name!r} of {name} is also one of another device.", hint=hint
+                            f"The stream {spec.name!r} of {name} of another device has the same name.", hint=hint
                         )
                     self._streams[spec.name] = StreamQueue(name, spec)
                 if self._advance is None:
@@ -177,10 +177,10 @@ class Reading:
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """Counts of the rows of each stream.
+        """Numbers of rows of each stream: received, written, dropped and others.
 
         After the ``with`` block received = written + dropped + duplicates + late. `written` rows were yielded. `gaps`
-        are rows that were missing where they were due, including late ones; 0 for a stream without numbers.
+        counts rows missing at their place, including late rows; 0 for a stream without row numbers.
         """
         return {
             name: StreamCounts(
@@ -196,18 +196,18 @@ class Reading:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of the drivers by ``device: name``, once the reading is over."""
+        """Event counts of the drivers, with keys ``device: name``, after the end of the reading."""
         return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
 
     def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
-        """Yield blocks of all streams until the time is over or a device has ended the reading; then stop the devices.
+        """Yield blocks of all streams until time is over or a device ends the reading; then stop all devices.
 
         Parameters
         ----------
         duration_s
-            Seconds of the clock from the call for the first block; may be infinite.
+            Duration from the request of the first block [s]; may be infinite.
         is_over
-            Called at every block's time, whether or not a device has sent anything; true ends the reading too.
+            Function called every `BLOCK_S`, even if no device has sent data; if it returns true, the reading ends.
         """
         now_ns = began_ns = self._clock()
         end_ns = now_ns + 1e9 * duration_s
@@ -222,7 +222,7 @@ class Reading:
                 yield from stream.take()
                 silent_ns = now_ns - max(began_ns, stream.received_ns)
                 if stream.rated and silent_ns > self._silent_ns:
-                    self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
+                    self._fail(stream.device, RigError(f"No data of {name} came for {1e-9 * silent_ns:.3g} s."))
         self._finish()
         for stream in self._streams.values():
             yield from stream.take()
@@ -231,13 +231,13 @@ class Reading:
         blocks = driver.read(timeout_s)
         for block in blocks:
             if block.stream not in self._streams:
-                hint = "Correct the driver: its streams are fixed once it is started."
-                raise RigError(f"A block of stream {block.stream!r} came, which {name} did not announce.", hint=hint)
+                hint = "Correct the driver: its streams must not change after start()."
+                raise RigError(f"A block of stream {block.stream!r} came, unknown to {name}.", hint=hint)
             self._streams[block.stream].put(block, self._clock())
         return bool(blocks)
 
     def _advance_and_read(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
-        """Advance virtual time, and read the devices meanwhile; return the time at the end."""
+        """Advance virtual time to `until_ns`, reading the devices meanwhile; return the time reached [ns]."""
         while not self._over.is_set() and now_ns < until_ns:
             now_ns = min(now_ns + round(1e9 * STEP_S), until_ns)
             advance(now_ns)
@@ -250,12 +250,12 @@ class Reading:
         return now_ns
 
     def _exhaust(self, name: str, driver: Driver, until_ns: int) -> None:
-        """Read until nothing comes, or until a time is over: a driver that polls its device takes time itself."""
+        """Read until no rows come, or until a time [ns]: a driver that polls its device itself lets time pass."""
         while self._read_once(name, driver, 0.0) and self._clock() <= until_ns:
             pass
 
     def _read(self, name: str, driver: Driver) -> None:
-        """Read one driver until the reading is over, then stop it: one thread does both."""
+        """Read one driver until the reading is over, then stop it in the same thread."""
         with self._lock:
             if self._over.is_set():
                 return
@@ -283,10 +283,10 @@ class Reading:
         self._over.set()
 
     def _finish(self) -> None:
-        """Stop every device that was started, or was being started.
+        """Stop every device that was started, even incompletely.
 
-        A reader that does not end within `STOP_S` keeps its driver, since one thread uses a driver; it ends when the
-        link is closed.
+        A reader that does not end within `STOP_S` keeps its driver, as only one thread may use a driver; the reader
+        ends when the link is closed.
         """
         with self._lock:  # a thread that was being started when Ctrl-C came does not touch the driver from now on
             self._over.set()
@@ -296,4 +296,4 @@ class Reading:
         for name, reader in self._readers.items():
             reader.join(STOP_S)
             if reader.is_alive():
-                self._fail(name, RigError(f"It did not stop within {STOP_S:g} s."))
+                self._fail(name, RigError(f"The reader did not stop within {STOP_S:g} s."))

@@ -1,4 +1,4 @@
-"""The devices of a rig file: their emulators and their drivers, from the installed plugins."""
+"""Devices of a rig file: emulators and drivers are made by the installed plugins."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tactbench.links.link import Clock, Link
 
 
 def with_sensor(file: RigFile, sensor: str) -> RigFile:
-    """Return a rig file with one of its sensors; raises UsageError if it has no entry for it."""
+    """Return a copy of a rig file with only one of its sensors; raises UsageError if the sensor has no entry."""
     if sensor not in file.sensors:
         raise UsageError(
             f"The rig file has no entry for the sensor {sensor!r}; it has {', '.join(file.sensors)}.",
@@ -35,9 +35,9 @@ def with_sensor(file: RigFile, sensor: str) -> RigFile:
 
 
 def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> bool:
-    """Prompt the operator with `text`, in a word `doing`; return whether the operator has confirmed.
+    """Prompt the operator with `text` (in short, `doing`); return True after confirmation, False if none is needed.
 
-    Devices that are all emulated need no operator.
+    No operator is needed if all devices are emulated.
 
     Raises
     ------
@@ -48,8 +48,8 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
     if all(entry.emulated or (entry.emulator and announced) for entry in file.entries().values()):
         return False
     if operator is None:
-        hint = "Start it at a terminal, or use a rig file with emulated devices."
-        raise RigError(f"Somebody has to {doing}: {text}", hint=hint)
+        hint = "Start the command at a terminal, or use a rig file with emulated devices."
+        raise RigError(f"An operator has to {doing}: {text}", hint=hint)
     operator.prompt(text)
     return True
 
@@ -57,9 +57,9 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:
     """Return the emulated devices of a rig with one of its sensors, by the names of :meth:`RigFile.entries`.
 
-    The channels read `senses`. Of the force sensor, its entry's channel gets the pressing force (``fz``) with the
-    entry's sign, and all its other channels are at rest. Each device draws from a generator of its own, made of the
-    file's seed and its name: a further device changes nothing for the others.
+    The channels read `senses`. In the force sensor, the channel of its entry gets the pressing force (``fz``) with the
+    entry's sign, its other channels are at rest. Each device has its own random generator, made of the file's seed and
+    the device's name: a further device does not change the noise of others.
 
     Raises
     ------
@@ -80,11 +80,11 @@ def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses)
 def emulated_device(
     descriptor: SensorDescriptor | DeviceDescriptor, name: str, entry: DeviceEntry, senses: Senses, seed: int
 ) -> EmulatedDevice:
-    """Return one emulated device; see :func:`emulators_of`."""
+    """Return one emulated device from its rig-file entry; see :func:`emulators_of`."""
     if descriptor.emulator is None or descriptor.emulated_link is None:
         raise UsageError(
-            f"{descriptor.name} has no emulator{' on a kind of link' if descriptor.emulator else ''}.",
-            hint="Give the address of a real one under `link:`, or leave it out.",
+            f"{descriptor.name} cannot be emulated{' on a kind of link' if descriptor.emulator else ''}.",
+            hint="Give the address of a real device under `link:`, or leave the device out.",
         )
     own = senses
     if isinstance(entry, ForceEntry):
@@ -109,16 +109,16 @@ def drivers_of(
     clock: Clock,
     names: Collection[str] | None = None,
 ) -> dict[str, Driver]:
-    """Open devices of a rig; return their drivers by the names of :meth:`RigFile.entries`. Close each.
+    """Open devices of a rig; return their drivers by the names of :meth:`RigFile.entries`. The caller closes each.
 
     Parameters
     ----------
     links
-        Functions that open the links of emulated devices, by name. The others are opened by the file's addresses.
+        Functions that open the links of emulated devices, by name. Other links are opened by the file's addresses.
     clock
         Clock of the host.
     names
-        Names of the devices; None: the sensor, and the force sensor if the file has one.
+        Names of the devices to open; None: the sensor, and the force sensor if the file has one.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def drivers_of(
     UsageError
         If the file has no entry for the sensor, a device has no driver, or an option is not known.
     LinkError, RigError
-        If a link cannot be opened, or a device refuses. Devices that were opened before are closed again.
+        If a link cannot be opened, or a device fails. Devices opened before are closed again.
     """
     drivers: dict[str, Driver] = {}
     with ExitStack() as opened:
@@ -146,18 +146,18 @@ def open_driver(
     clock: Clock,
     link: Callable[[], Link] | None = None,
 ) -> Driver:
-    """Open one device; see :func:`drivers_of`. `link` opens the link of an emulated one."""
+    """Open one device, see :func:`drivers_of`; `link` is the function that opens an emulated device's link."""
     if descriptor.driver is None:
         raise UsageError(
             f"{descriptor.name} has no driver: it can be simulated or replayed, not read.",
-            hint="A plugin's SensorDescriptor names one; see docs/plugins.md.",
+            hint="Name a driver in the plugin's SensorDescriptor; see docs/plugins.md.",
         )
     if not entry.emulated:
         link = partial(open_link, entry.link, clock)
     elif link is None:
         raise UsageError(
-            f"{descriptor.name} is emulated, and nothing emulates it here.",
-            hint="Give the address of its link: `tactbench emulate` prints one.",
+            f"{descriptor.name} is emulated, but this command starts no emulators.",
+            hint="Give the address of its link, as printed by `tactbench emulate`.",
         )
     streams = descriptor.spec.streams if isinstance(descriptor, SensorDescriptor) else ()
     settings = DriverSettings(link, streams, options_of(descriptor, entry), clock)
@@ -166,7 +166,7 @@ def open_driver(
 
 
 def options_of(descriptor: SensorDescriptor | DeviceDescriptor, entry: DeviceEntry) -> dict[str, Scalar | bool]:
-    """Return the options of an entry; an emulated device has defaults for those that are left out."""
+    """Return the options of an entry; for an emulated device, options left out get defaults."""
     return {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
 
 
@@ -176,22 +176,22 @@ def descriptor_of(registry: Registry, name: str, entry: DeviceEntry) -> SensorDe
     Raises
     ------
     UnknownNameError
-        If it is not installed.
+        If the sensor or device is not installed.
     UsageError
-        If the force sensor's device is of another kind.
+        If the device under `force` is not a force sensor.
     """
     if not isinstance(entry, ForceEntry | NamedDevice):
         return registry.sensors[name]
     descriptor = registry.devices[entry.device]
     if isinstance(entry, ForceEntry) and descriptor.kind != "force":
         known = ", ".join(device.name for device in registry.devices if device.kind == "force") or "none"
-        raise UsageError(f"{entry.device} is a {descriptor.kind}, no force sensor.", hint=f"Installed are: {known}.")
+        raise UsageError(f"{entry.device} is a {descriptor.kind}, not a force sensor.", hint=f"Installed are: {known}.")
     return descriptor
 
 
 @contextmanager
 def _entry(name: str) -> Iterator[Any]:
-    """Name the entry of the rig file in errors."""
+    """Add the name of the rig file's entry to the message of errors."""
     try:
         yield
     except TactbenchError as error:

@@ -1,4 +1,4 @@
-"""Driver of one stream, for devices whose received data become rows without more ado."""
+"""Base class of simple drivers with one stream, for devices whose received data are directly converted to rows."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ L = TypeVar("L", ByteLink, CanLink, DatagramLink)
 
 
 class Sample(NamedTuple):
-    """One sample of each channel."""
+    """One row: a value of each channel."""
 
     values: Sequence[float]
-    """As many numbers as the stream has channels."""
+    """Values in the order of the stream's channels."""
     quality: Sequence[int] | None = None
-    """A :class:`~tactbench.core.samples.Quality` each; None: all good."""
+    """One :class:`~tactbench.core.samples.Quality` for each channel; None: all good."""
     t_ns: int | None = None
-    """Time of receipt, where its last piece came before the data that complete it; None: that of the data."""
+    """Time of receipt [ns], if it differs from that of the data which complete the row; None: that of these data."""
 
 
 class RowDriver(Driver, Generic[L]):
-    """Driver of one stream behind one link; a subclass has the kind of link and makes :meth:`rows` of received data.
+    """Driver of one stream on one link; a subclass states the kind of link and converts received data to :meth:`rows`.
 
-    Rows have their time of receipt. A device with several streams, numbers or a clock of its own needs a
+    Rows get their time of receipt. A device with several streams, sample numbers or its own clock needs a
     :class:`Driver`.
     """
 
     stream: ClassVar[StreamSpec]
-    """Stream that it reads."""
+    """Stream that the driver reads."""
     link: L
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
         self.counted: Counter[str] = Counter()
-        """Counts of a subclass, such as damaged frames, by name."""
+        """Event counts of a subclass by name, such as damaged frames."""
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """The one stream."""
+        """Return the only stream."""
         return (self.stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of the driver and of its link, by name."""
+        """Event counts of the driver and of its link, by name."""
         return {**getattr(self.link, "counts", {}), **self.counted}
 
     def start(self) -> None:
@@ -64,23 +64,23 @@ class RowDriver(Driver, Generic[L]):
         self.begin()
 
     def begin(self) -> None:
-        """Drop the part of a frame and let the device sample, in a subclass that needs it."""
+        """Drop a partial frame and let the device sample, in subclasses where this is needed."""
 
     def ask(self) -> None:
-        """Send a request, in a subclass whose device answers requests; called before each read."""
+        """Send a request, in subclasses whose device only answers requests; called before each read."""
 
     @abstractmethod
     def rows(self, received: Any) -> Iterable[Sample]:
-        """Return the rows that received data complete.
+        """Return the rows completed by received data.
 
         Parameters
         ----------
         received
-            A ``Received`` (data, t_ns) of a ByteLink or DatagramLink, a ``CanFrame`` of a CanLink.
+            A ``Received`` (data, t_ns) of a ByteLink or DatagramLink, or a ``CanFrame`` of a CanLink.
         """
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the rows received since the last call."""
+        """Return the rows received since the last call, in one block or none."""
         self.ask()
         times: list[int] = []
         found: list[Sample] = []
@@ -99,9 +99,9 @@ class RowDriver(Driver, Generic[L]):
         return [Block(self.stream.name, np.array(times, np.int64), data, quality if quality.any() else None)]
 
     def stop(self) -> None:
-        """Call :meth:`quiet`; raises nothing if the device is gone."""
+        """Stop the device by :meth:`quiet`; raises no error if the device is gone."""
         with suppress(LinkError):
             self.quiet()
 
     def quiet(self) -> None:
-        """Stop the device, in a subclass that can."""
+        """Stop the device, in subclasses whose device can be stopped."""

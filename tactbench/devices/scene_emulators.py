@@ -1,7 +1,7 @@
-"""The emulated devices of a rig file, and the simulated scenes that they sense: in this process, or in another one.
+"""Emulated devices of a rig file, and the simulated scenes that they sense, in this process or in another process.
 
 In virtual time the devices are in the process of the rig. In real time `tactbench emulate` serves them in a process of
-its own, which the rig's work cannot delay; there a simulated rig carries out each scene that the rig announces. The
+its own, which the rig's work cannot delay; there a simulated rig carries out each scene requested by the rig. The
 devices are at rest until the recording begins.
 """
 
@@ -27,28 +27,28 @@ from tactbench.devices.emulation.scene_samples import SceneSamples
 from tactbench.devices.rig_devices import descriptor_of, emulators_of, options_of
 
 PREPARE_S = 300.0
-"""Timeout for the simulation of a scene in another process."""
+"""Timeout for the simulation of a scene in another process [s]."""
 BEGIN_S = 5.0
-"""Timeout for the begin of a scene there."""
+"""Timeout for the begin of a scene in another process [s]."""
 LISTEN_S = 0.2
-"""Longest wait for a message, after which errors of the devices are looked for."""
+"""Longest wait for a message [s], after which the devices are checked for errors."""
 
 
 class RigEmulators(Protocol):
-    """Emulators of a rig, which outlive scenes; ``RigDescriptor.emulators`` makes them of a rig file and a registry."""
+    """Emulators of a rig, for several scenes; made by ``RigDescriptor.emulators`` from a rig file and a registry."""
 
     devices: Mapping[str, EmulatedDevice]
-    """By their names in the rig file; at rest before the first scene."""
+    """Devices by their name in the rig file; at rest before the first scene."""
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
-        """Take what the simulated rig has recorded of a scene; nothing is pressed before :meth:`begin`."""
+        """Take a scene's samples, recorded by the simulated rig; the sensor is not pressed before :meth:`begin`."""
 
     def begin(self, at_s: float) -> None:
-        """Let the scene begin, at a second of the devices' clock."""
+        """Let the scene begin at a time of the devices' clock [s]."""
 
 
 class SceneEmulators(RigEmulators):
-    """Emulators of sensors and a force sensor that sense what a simulated rig has recorded; nothing moves."""
+    """Emulators of sensors and a force sensor that replay the samples of a simulated rig; nothing moves."""
 
     def __init__(self, file: RigFile, registry: Registry) -> None:
         self._samples: SceneSamples | None = None
@@ -61,13 +61,13 @@ class SceneEmulators(RigEmulators):
         return {} if self._samples is None else self._samples(t_s)
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
-        """Take the samples of a scene."""
+        """Take the samples of a scene from the simulated rig."""
         profile = scene.profile
         streams = (*simulated.streams, *simulated.reference)
         self._samples = SceneSamples(streams, simulated, profile.duration.to("s"), rest_s=profile.hold_s)
 
     def begin(self, at_s: float) -> None:
-        """Let the scene begin."""
+        """Let the prepared scene begin."""
         if self._samples is not None:
             self._samples.start(at_s)
 
@@ -75,14 +75,14 @@ class SceneEmulators(RigEmulators):
 def serve(
     file: RigFile, registry: Registry, *, started: Callable[[RigFile], None], progress: Callable[[str], None]
 ) -> None:
-    """Run the emulated devices of a rig file in real time, until an interrupt.
+    """Run the emulated devices of a rig file in real time, until interrupted.
 
     Parameters
     ----------
     started
-        Called once with the rig file that opens the devices.
+        Function called once with the rig file that opens the devices.
     progress
-        Called with a sentence for each scene that is prepared or begins.
+        Function called with a message for each scene that is prepared or begins.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def serve(
 
 
 def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], control: str) -> RigFile:
-    """Return the rig file that opens emulated devices at their addresses."""
+    """Return a rig file with the addresses of the emulated devices' links."""
     plain, entries = file.model_dump(), file.entries()
     for name, address in addresses.items():
         part = plain if name == FORCE else plain["sensors" if name in file.sensors else "devices"]
@@ -137,14 +137,14 @@ def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], co
 
 
 class ScenePhysics(Rig):
-    """The simulation of the scenes that a rig's emulated devices sense.
+    """Simulation of the scenes that a rig's emulated devices sense.
 
     Parameters
     ----------
     rig
-        The simulated rig; None: it is in the process of the devices.
+        The simulated rig; None: it runs in the process of the emulated devices.
     control
-        Address ``host:port`` of that process, from ``emulation: control`` of a rig file.
+        Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file.
     """
 
     def __init__(self, rig: Rig | None, control: str = "") -> None:
@@ -152,7 +152,7 @@ class ScenePhysics(Rig):
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[Acquisition]:
-        """Carry out a scene; in another process its samples stay there, for the devices, until :meth:`begin`.
+        """Simulate a scene; if another process does so, the samples stay there for its devices until :meth:`begin`.
 
         Raises
         ------
@@ -170,7 +170,7 @@ class ScenePhysics(Rig):
         yield without_streams
 
     def begin(self) -> None:
-        """Let the scene begin in the other process; raises as :meth:`open`."""
+        """Let the scene begin in the other process; raises the errors of :meth:`open`."""
         if self._rig is None:
             self._request({"begin": True}, BEGIN_S)
 
@@ -185,7 +185,7 @@ class ScenePhysics(Rig):
             except OSError as error:
                 raise RigError(
                     f"The emulated devices at {self._control} do not answer: {error}.",
-                    hint="Start them again: `tactbench emulate`.",
+                    hint="Start the devices again with `tactbench emulate`.",
                 ) from error
         if "error" in answer:
             raise (NotApplicable if answer["skip"] else RigError)(answer["error"], hint=answer["hint"])
@@ -193,18 +193,18 @@ class ScenePhysics(Rig):
 
 
 def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
-    """Return the simulation of the scenes that a rig's emulated devices sense; None: the file has no such devices.
+    """Return the simulation of scenes for a rig's emulated devices; None: the rig file has no emulated devices.
 
     Raises
     ------
     UsageError
-        If the file names a rig that is no simulation.
+        If the rig under `physics` is not a simulation.
     """
     if not file.emulated:
         return ScenePhysics(None, file.emulation.control) if file.emulation.control else None
     descriptor = registry.rigs[file.emulation.physics or registry.first_rig("simulated")]
     if not descriptor.simulated:
         raise UsageError(
-            f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
+            f"`physics: {descriptor.name}` in the rig file is not a simulated rig.", hint="Use `physics: twin`."
         )
     return ScenePhysics(load_object(descriptor.where)(rig_context(registry)))

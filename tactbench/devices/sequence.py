@@ -1,4 +1,4 @@
-"""Counters of devices: unwrapped, and checked for rows that are lost, doubled or late."""
+"""Counters of devices: unwrapped after an overflow, and checked for lost, duplicated or late rows."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy.typing as npt
 from tactbench.core.samples import Block, IntArray, Quality
 
 RESTARTED = 20
-"""Number of rows behind the highest number, each one above the one before, after which a counter has restarted
+"""Number of successive rows with rising numbers below the highest number, after which a counter counts as restarted
 (assumed: a network holds back fewer datagrams in order)."""
 
 
 class Unwrap:
-    """Unwrapped counter of `bits` bits.
+    """Conversion of a device's counter of `bits` bits to numbers without overflow.
 
     The difference d from the highest count so far, modulo 2^bits, classifies a count: 0 is a duplicate, 1 the next one,
     up to 2^(bits-1) - 1 one after a gap of d - 1, above that a late one (derived: half of the range each way; for 32
-    bits the same as pyNetFT's sequence.cpp). A late one gets its own number, and the highest stays. The counter must
+    bits the same as pyNetFT's sequence.cpp). A late row gets its own number, and the highest stays. The counter must
     not advance by more than half a wrap between two counts: 32 bits at 7 kHz take 85 hours for that.
     """
 
@@ -28,7 +28,7 @@ class Unwrap:
         self._highest: int | None = None
 
     def __call__(self, counts: npt.ArrayLike) -> IntArray:
-        """Return (n,) int64 numbers of (n,) `counts` in the order of receipt; the first is its own number."""
+        """Return (n,) int64 numbers for (n,) `counts` in the order of receipt; the first number equals its count."""
         now = np.asarray(counts).astype(np.int64) % self._modulus
         for place, count in enumerate(now.tolist()):
             highest = count if self._highest is None else self._highest
@@ -40,22 +40,22 @@ class Unwrap:
 
 
 class SequenceCheck:
-    """Filter of one stream's rows by their numbers: it drops duplicates and late rows, and marks the row after a gap.
+    """Filter of one stream's rows by their numbers: drops duplicated and late rows, and marks the row after a gap.
 
     The counter of a device that was restarted begins again: after `RESTARTED` rows that seemed late, which are lost,
     numbers continue from the highest one, with a gap of one row or more.
 
     A stream without numbers passes unchanged. Its gaps are not guessed from its times: an interval of more than 1.5
-    periods is as often a late host as a lost row.
+    periods is as often due to a late host as to a lost row.
 
     Attributes
     ----------
     received
         Number of rows received.
     duplicates, late
-        Number of dropped rows with the highest number so far, or a lower one.
+        Number of dropped rows with the highest number so far, and with a lower number.
     gaps
-        Number of rows that were missing where they were due, including late ones.
+        Number of rows missing at their place, including rows that came late.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class SequenceCheck:
         self._shift, self._behind = 0, (0, 0)
 
     def __call__(self, block: Block) -> Block | None:
-        """Return the block without dropped rows, rows after a gap marked in all channels; None: no row is left."""
+        """Return the block without dropped rows, with rows after a gap marked in all channels; None: no row is left."""
         self.received += len(block.data)
         if block.sequence is None or not len(block.sequence):
             return block if len(block.data) else None
@@ -86,7 +86,7 @@ class SequenceCheck:
         return kept if len(kept.data) else None
 
     def _counted_on(self, numbers: IntArray) -> IntArray:
-        """Return numbers that continue where the device's counter has restarted."""
+        """Return numbers that continue from the highest number after the device's counter has restarted."""
         numbers = numbers + self._shift
         highest = int(numbers[0]) - 1 if self._highest is None else self._highest
         if numbers[0] > highest and (np.diff(numbers) > 0).all():

@@ -1,4 +1,4 @@
-"""Replay: recordings that were made elsewhere, or earlier."""
+"""The rig `replay`: recordings that were made elsewhere, or earlier, instead of new ones."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from tactbench.plugin import MissingRecordingError, ReplayRig, RigContext, RigDe
 TACTBENCH_API = 2
 
 ENDING = ".h5"
-_HINT = "Make some with `tactbench import MAPPING.yaml --out DIR` or `tactbench record --out FILE`."
+_HINT = "Make recordings with `tactbench import MAPPING.yaml --out DIR` or `tactbench record --out FILE`."
 
 
 class RecordingFolder(ReplayRig):
-    """The recordings of one folder and all folders below it.
+    """The recordings in one folder and in all folders below it.
 
     Parameters
     ----------
     folder
-        The folder. Files of a crash (``….h5.partial``) and hidden files are skipped.
+        Folder with the recordings. Unfinished files of a crash (``….h5.partial``) and hidden files are skipped.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def recordings(self) -> Sequence[Path]:
-        """Return the files, sorted by their path below the folder.
+        """Return the recordings' files, sorted by their path below the folder.
 
         Raises
         ------
         MissingRecordingError
-            If there is no such folder, it is empty, or an import into it was interrupted.
+            If the folder does not exist or has no recordings, or an import into it was interrupted.
         """
         if not self.folder.is_dir():
-            what = f"{self.folder} is no folder" if self.folder.exists() else f"There is no folder {self.folder}"
+            what = f"{self.folder} is not a folder" if self.folder.exists() else f"There is no folder {self.folder}"
             raise MissingRecordingError(f"{what}.", hint=_HINT)
         found, unfinished = [], 0
         for below, folders, names in os.walk(self.folder):  # skips folders that vanish or cannot be read
             if any(name.startswith(".placing-") for name in folders):
                 raise MissingRecordingError(
-                    f"An import into {below} was interrupted while its recordings were moved there: some are missing.",
-                    hint="Give the same import again, or wait until it ends.",
+                    f"An import into {below} was interrupted while its recordings were moved there: files are missing.",
+                    hint="Run the same import again, or wait until it ends.",
                 )
             folders[:] = [name for name in folders if not name.startswith(".")]
             for name in names:
@@ -58,23 +58,23 @@ class RecordingFolder(ReplayRig):
 
 
 def build(context: RigContext) -> RecordingFolder:
-    """Return the rig.
+    """Build the rig `replay`.
 
     Raises
     ------
     UsageError
-        If the context names no folder of recordings.
+        If the context has no folder of recordings.
     """
     if context.recordings is None:
         raise UsageError(
-            "The rig 'replay' needs to know where the recordings are.",
-            hint=f"Name their folder with --recordings DIR. {_HINT}",
+            "The rig 'replay' needs a folder of recordings.",
+            hint=f"Give the folder by --recordings DIR. {_HINT}",
         )
     return RecordingFolder(Path(context.recordings))
 
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
-    """Offer the rig."""
+    """Register the rig `replay` with the plugin manager."""
     here = __name__
     return [RigDescriptor(name="replay", title="recordings made elsewhere", where=f"{here}:build", replays=True)]

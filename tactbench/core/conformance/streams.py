@@ -184,4 +184,4 @@ def force_is(where: str, found_n: float, meant_n: float) -> None:
 def likely(factor: float) -> str:
     """Return the likely cause of a wrong factor on a force, as a question, or an empty text."""
     units = [unit for other, unit in UNITS_OF_FORCE.items() if 0.8 < factor / other < 1.25]
-    return f": are these {units[0]}?" if units else ": is its sign turned?" if factor < 0 else ""
+    return f": are these {units[0]}?" if units else ": is the sign reversed?" if factor < 0 else ""

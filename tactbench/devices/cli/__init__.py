@@ -1,1 +1,1 @@
-"""Verbs of the command line about devices."""
+"""Subcommands of the command line for devices."""

@@ -1,4 +1,4 @@
-"""Check of the devices of a rig file, one by one: opening, identity, and what each sends while nothing touches it."""
+"""Check of each device in a rig file: opening, identity, and the data that it sends while nothing touches it."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Clock
 
 READ_S = 0.25
-"""Longest wait of one read."""
+"""Longest wait of one read of a driver [s]."""
 RATE_TOLERANCE = 0.02
-"""Relative difference from the stated rate that is a problem. Assumed: quartz is a hundred times better, a timer of
+"""Largest relative error of a right rate. Assumed: quartz is a hundred times better, a timer of
 whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
 HELD_S = 0.016
-"""How long a usual USB serial adapter may hold data back (FTDI's latency timer as delivered) [s]."""
+"""Longest time for which a usual USB serial adapter holds data back (default of FTDI's latency timer) [s]."""
 _CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connected?)",
            "SUSPECT": " (cable, shield, ground?)", "SATURATED": " (is something touching it?)"}  # fmt: skip
 
 
 @dataclass
 class DeviceCheck:
-    """Result of the check of one device."""
+    """Result of checking one device of a rig file."""
 
     name: str
-    """Name in messages."""
+    """Name of the device in messages."""
     device: str
-    """Sensor or device of that name in the registry."""
+    """Registry name of the sensor or device."""
     link: str
     emulated: bool
     identity: dict[str, str] = field(default_factory=dict)
     streams: list[dict[str, Any]] = field(default_factory=list)
-    """Statistics of its streams, a record for each kind of channel; keys end in their units."""
+    """Statistics of the device's streams: one record for each kind of channel; keys end in the unit of the value."""
     counts: dict[str, int] = field(default_factory=dict)
-    """Counts of its driver."""
+    """Event counts by name, as reported by the device's driver."""
     remarks: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
-    """Problems, each with the next step."""
+    """Problems found, each with advice on the next step."""
 
 
 def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, clock: Clock) -> list[DeviceCheck]:
-    """Open, identify and read each device for some seconds; a problem of one is in its check and ends no other.
+    """Open, identify and read each device for some seconds; a problem is reported and does not end the other checks.
 
     A motor is opened and identified, and never started. Emulated devices are not opened.
     """
@@ -68,7 +68,7 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
         except TactbenchError as error:
             check.problems.append(str(error))
         except Exception as error:  # a driver of others may raise anything
-            check.problems.append(f"Its driver raised {type(error).__name__}: {error}. Tell whoever wrote the driver.")
+            check.problems.append(f"The device's driver raised {type(error).__name__}: {error}. Tell its author.")
     return checks
 
 
@@ -101,26 +101,26 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
             check.streams += [{**about, **record} for record in _noise(stream)]
             check.problems += problems
         else:
-            check.problems.append(f"Nothing came of its stream {name} within {seconds:g} s. {ByteLink.silence_hint}")
+            check.problems.append(f"No data of stream {name} came within {seconds:g} s. {ByteLink.silence_hint}")
 
 
 def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[str, Any], list[str]]:
-    """Return rate, losses and clock of a stream, and their problems."""
+    """Return statistics of a stream (rate, lost rows, clock drift) and the problems found."""
     name, rows, times, stated_hz = stream.spec.name, len(stream.data), stream.t_ns, stream.spec.rate_hz
     marks, hz, drift, problems = np.bitwise_or.reduce(marks_of(stream), axis=1), None, None, []
     if times is not None and times[-1] > times[0]:
         hz = float(np.count_nonzero(times > times[0]) / (times[-1] - times[0]) * 1e9)
         allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * hz / rows
         if stated_hz is not None and abs(hz / stated_hz - 1) > allowed:
-            problems.append(f"Stream {name} came at {hz:.4g} Hz, stated are {stated_hz:.4g} Hz.")
+            problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
         if stream.device_ns is not None:
             fit = ClockFit()
             fit.add(stream.device_ns, times)
             drift = fit.segments()[-1].drift
             if refused := wrong_rate(name, drift, round(1e9 * rows / hz)):
-                problems.append(f"{refused}. Correct device_ns in its driver.")
+                problems.append(f"{refused}. Correct device_ns in the device's driver.")
     marked = {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))}
-    lacking = {"lost": order.gaps, "twice or late": order.duplicates + order.late, **marked}
+    lacking = {"lost": order.gaps, "received twice or late": order.duplicates + order.late, **marked}
     texts = [f"{number} {what}{_CAUSES.get(what, '')}" for what, number in lacking.items() if number]
     if texts:
         problems.append(f"Stream {name}, of {rows} rows: {', '.join(texts)}.")
@@ -131,7 +131,7 @@ def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[
 
 
 def _noise(stream: StreamData) -> Iterator[dict[str, Any]]:
-    """Yield the largest standard deviation of each kind of channel in one unit, and the constant channels."""
+    """Yield, for each kind and unit of channels, the largest standard deviation and the names of constant channels."""
     values, channels = good(stream), stream.spec.channels
     for kind, unit in dict.fromkeys((channel.kind, channel.unit) for channel in channels):
         own = [place for place, one in enumerate(channels) if (one.kind, one.unit) == (kind, unit)]

@@ -1,4 +1,4 @@
-"""``tactbench doctor``: this machine's ports and buses, and whether the devices of a rig answer."""
+"""``tactbench doctor``: check of this machine's ports and buses, and of a rig's devices."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 @click.command(name="doctor", short_help="Check ports, permissions, extras and clocks, and a rig's devices.")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
-              help="Also check what the rig would do by this file, then open and read its devices.")  # fmt: skip
+              help="Also check the forces which this rig file permits, then open and read its devices.")  # fmt: skip
 @click.option("--seconds", type=FiniteRange(min=0, max=600), default=3.0, show_default=True, metavar="T",
-              help="Time to read each device; 0 opens nothing.")  # fmt: skip
+              help="Time [s] to read each device; 0 opens no device.")  # fmt: skip
 @click.option("--jog", metavar="AXIS",
-              help="Move one axis of the rig by small steps, with the force watched and shown.")  # fmt: skip
+              help="Move one axis of the rig by small steps; the force is monitored and shown.")  # fmt: skip
 @format_option("table", "json")
 @click.pass_context
 def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str | None, shape: str) -> None:
-    """Check ports, permissions, buses, extras and the clock, and the devices of a rig.
+    """Check ports, permissions, buses, optional packages and clock of this machine, and the devices of a rig.
 
     Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
     printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
@@ -67,7 +67,7 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
     else:
         _print(host, would, checks, of_rig + denied)
         if rig is not None and not checks and jog is None:
-            click.echo("Nothing was opened, and nothing has moved.")
+            click.echo("No device was opened, and no axis has moved.")
     if jog is not None and not of_rig:
         from tactbench.devices.cli.jog import jog_axis
 

@@ -1,4 +1,4 @@
-"""What this machine offers to devices: ports, buses, networks, extras, and how late its sleeps end."""
+"""Resources of this machine for devices: ports, buses, networks, optional packages, and the lateness of its sleeps."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from pathlib import Path
 from typing import Literal
 
 REQUESTED_BUFFER_BYTES = 4 << 20
-"""Receive buffer that a datagram link requests of the system unless its address states another."""
+"""Size of the receive buffer [bytes] that a datagram link requests unless its address states another size."""
 FOR_DEVELOPERS = ("docs", "test", "dev")
-"""Extras that no device needs."""
+"""Optional dependencies (extras) that no device needs."""
 SLEEP_S = 0.005
-"""Length of a sleep whose lateness is measured: half a BioTac frame."""
+"""Length of the sleeps whose lateness is measured [s]: half a BioTac frame."""
 SLEEPS = 100
 
 
 @dataclass(frozen=True)
 class HostItem:
-    """One thing that devices may need."""
+    """One resource of this machine that devices may need, and its state."""
 
     kind: str
-    """``serial port``, ``SPI``, ``CAN``, ``network``, ``extra`` or ``clock``."""
+    """Kind of resource: ``serial port``, ``SPI``, ``CAN``, ``network``, ``extra`` or ``clock``."""
     name: str
     state: Literal["works", "missing", "denied"]
-    """``denied``: it exists, and this user may not open it."""
+    """``denied``: the resource exists, but this user may not open it."""
     text: str = ""
     hint: str = ""
-    """The next step where it does not work."""
+    """Advice on the next step if the state is not ``works``."""
 
 
 def look_at_host() -> list[HostItem]:
-    """Return what this machine has; takes about half a second, opens no device."""
+    """Return the resources of this machine; takes about half a second, opens no device."""
     return [*serial_ports(), *spi_devices(), *can_interfaces(), *network(), *extras(), clock()]
 
 
 def serial_ports() -> Iterator[HostItem]:
-    """Yield the serial ports that pyserial lists, with the names that stay when they are plugged in elsewhere."""
+    """Yield the serial ports that pyserial lists, with the path that stays the same in another USB socket."""
     from serial.tools.list_ports import comports
 
     names = sorted(Path("/dev/serial/by-id").glob("*"))
@@ -61,7 +61,7 @@ def spi_devices() -> Iterator[HostItem]:
     paths = sorted(Path("/dev").glob("spidev*"))
     yield from (_device("SPI", str(path)) for path in paths)
     if not paths:
-        hint = "A bridge on a serial port needs none: docs/links.md."
+        hint = "A bridge on a serial port needs no SPI device: see docs/links.md."
         yield HostItem("SPI", "spidev", "missing", "no /dev/spidev*", hint)
 
 
@@ -73,19 +73,19 @@ def _device(kind: str, path: str, text: str = "") -> HostItem:
         return HostItem(kind, path, "works", text)
     if os.access(place, os.R_OK | os.W_OK):  # opening it would reset some devices
         return HostItem(kind, path, "works", text)
-    hint = f"Join its group, {group}, then log in again: sudo usermod -aG {group} $USER"
-    return HostItem(kind, path, "denied", text, "A udev rule may give it to a group." if group == "root" else hint)
+    hint = f"Join the port's group, {group}, then log in again: sudo usermod -aG {group} $USER"
+    return HostItem(kind, path, "denied", text, "Let a udev rule set its group." if group == "root" else hint)
 
 
 def can_interfaces() -> Iterator[HostItem]:
-    """Yield whether the kernel has CAN sockets, and their interfaces, up or not."""
+    """Yield the state of the kernel's CAN sockets, and of each CAN interface (up or down)."""
     import psutil
 
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
         yield HostItem("CAN", "socketcan", "works")
     except (OSError, AttributeError):
-        yield HostItem("CAN", "socketcan", "missing", "the kernel has no AF_CAN", "can://slcan/PORT needs none.")
+        yield HostItem("CAN", "socketcan", "missing", "the kernel has no AF_CAN", "can://slcan/PORT works without.")
     for name, stats in sorted(psutil.net_if_stats().items()):
         if "can" not in name:
             continue
@@ -97,7 +97,7 @@ def can_interfaces() -> Iterator[HostItem]:
 
 
 def network() -> Iterator[HostItem]:
-    """Yield the size of the largest receive buffer: how many datagrams the system holds for a process that is late."""
+    """Yield the largest permitted receive buffer [bytes], which holds datagrams until a late process reads them."""
     try:
         largest = int(Path("/proc/sys/net/core/rmem_max").read_text())
     except (OSError, ValueError):
@@ -111,7 +111,7 @@ def network() -> Iterator[HostItem]:
 
 
 def extras() -> Iterator[HostItem]:
-    """Yield the extras that tactbench's own metadata states, but those of :data:`FOR_DEVELOPERS`."""
+    """Yield tactbench's optional dependencies (extras), except those in :data:`FOR_DEVELOPERS`."""
     lacking: dict[str, list[str]] = {}
     for requirement in metadata.requires("tactbench") or ():
         found = re.match(r"([\w.-]+).*extra\s*==\s*['\"]([^'\"]+)", requirement)
@@ -126,7 +126,7 @@ def extras() -> Iterator[HostItem]:
 
 
 def clock() -> HostItem:
-    """Measure how late sleeps end."""
+    """Measure by how many milliseconds sleeps end late."""
     late_ms = []
     for _ in range(SLEEPS):
         before_s = time.monotonic()

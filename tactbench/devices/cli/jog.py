@@ -1,4 +1,4 @@
-"""``tactbench doctor --jog``: one axis of a rig moves by small steps while the force is watched and shown."""
+"""``tactbench doctor --jog``: move one axis of a rig by small steps, while the force is monitored and shown."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ if TYPE_CHECKING:
     from tactbench.links.link import Clock
 
 STEP_M, LONGEST_M, SPEED_M_S = 0.1e-3, 1e-3, 1e-3
-"""Length of `+` and `-`; the longest step; the speed (assumed: a hand reaches the emergency stop meanwhile)."""
+"""Step of `+` and `-` [m]; longest step [m]; speed [m/s] (assumed: slow enough to reach the emergency stop)."""
 LOOK_S, OLD_S = 2e-3, 0.1
-"""Longest wait for a force sample; and its largest age (assumed: three samples of a slow sensor)."""
+"""Longest wait for a force sample, and largest age of a sample [s] (assumed: three samples of a slow sensor)."""
 
 
 def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, name: str) -> None:
-    """Open an axis and the force sensor of a checked rig file, emulated ones in virtual time, and move at a terminal.
+    """Open an axis and the force sensor of a checked rig file, and move the axis by commands typed at a terminal.
 
     Raises
     ------
     UsageError
         If there is no rig file, no such axis in it, or no force sensor.
     LinkError, RigError
-        If one of them does not answer, or fails.
+        If axis or force sensor does not answer, or fails.
     """
     file = would.file if would else None
     if rig is None or file is None or would is None or file.force is None or name not in file.devices:
-        known = ", ".join(file.devices) if file and file.force else "none beside a force sensor"
-        raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Name one with --rig-file FILE; it has {known}.")
+        known = ", ".join(file.devices) if file and file.force else "none with a force sensor"
+        raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Axes in --rig-file: {known}.")
 
     def ask(text: str) -> str:
         return str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True))
@@ -62,16 +62,16 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
             stack.callback(driver.close)
         axis = drivers[name]
         if not isinstance(axis, Positioner):
-            raise UsageError(f"The {name} is no Positioner.", hint="`--jog` moves an axis of the rig.")
+            raise UsageError(f"The device {name} is not an axis.", hint="Give an axis of the rig after --jog.")
         move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n, ask, remark)
 
 
 def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float,
                   ask: Callable[[str], str], say: Callable[[str], None]) -> None:  # fmt: skip
-    """Take the force's zero, home the axis if it is not, and move it by the answers, until an empty one.
+    """Take the force's zero, home the axis if needed, and move it by the operator's answers until an empty answer.
 
-    The axis halts where the norm of the force is at `ceiling_n`, or the force is not known; after that only a step back
-    is carried out.
+    The axis halts if the norm of the force reaches `ceiling_n`, or if the force is not known; after that only a step
+    back is carried out.
     """
     clock, pressing = axis.clock, PressingForce(entry, force.streams)
     for device in (force, axis):
@@ -93,21 +93,21 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     back = 0
 
     def look() -> str:
-        """Read axis and force once; return the problem with the force."""
+        """Read axis and force once; return the problem with the force, empty if there is no problem."""
         axis.update(0.0)
         found = [watch.take(block, limits, travelling=True) for block in force.read(LOOK_S)]
         problem = next(filter(None, found), None) or watch.old(clock(), limits)
         return ": ".join(problem) if problem else ""
 
     def look_afresh() -> str:
-        """Read until a sample comes that is received from now on; return the problem with the force."""
+        """Read until a force sample arrives after this call; return the problem with the force, if any."""
         since_ns = clock()
         while not (wrong := look()) and watch.t_ns < since_ns:
             pass
         return wrong
 
     def answer_to(text: str) -> str:
-        """Return the answer to a prompt, once the force samples that have waited meanwhile are read."""
+        """Return the answer to a prompt, after reading the force samples received while the prompt was shown."""
         answer, since_ns = ask(text).strip(), clock()
         while watch.t_ns < since_ns and clock() < since_ns + 1e9 * OLD_S:
             for block in force.read(LOOK_S):
@@ -115,11 +115,11 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         return answer
 
     def move(step_m: float) -> None:
-        """Carry out a step, unless the force forbids it; halt where it goes wrong, unless the way leads back."""
+        """Carry out a step if the force permits it or the step leads back; halt at a problem with the force."""
         nonlocal back
         way = int(math.copysign(1, step_m))
         if (wrong := look_afresh()) and way != back:
-            raise RigError(f"It does not move further that way: {wrong}.", hint="Move back.")
+            raise RigError(f"The axis moves no further in this direction: {wrong}.", hint="Move it back.")
         most_n, halted = abs(watch.force_n) + ceiling_n, ""
         axis.move_to(axis.position + step_m, min(SPEED_M_S, axis.facts.speed))
         while axis.moving:
@@ -133,7 +133,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
 
     try:
         if not (axis.homed or axis.find_home()):
-            clear = "Is it clear of the sensor, and the emergency stop within reach? Write yes: it is homed. "
+            clear = "Is it clear of the sensor, and the emergency stop within reach? Type yes to home it. "
             if answer_to(f"The {name} is not homed. {clear}") != "yes":
                 return
             axis.home(lambda: bool(look()))
@@ -142,16 +142,16 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         while True:
             wrong = look_afresh()
             where = f"{name} at {1e3 * axis.position:.3f} mm, {watch.force_n:+.3f} N{f' ({wrong})' if wrong else ''}"
-            answer = answer_to(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: so many mm; Enter alone: end. ")
+            answer = answer_to(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: step in mm; Enter alone: end. ")
             if not answer:
                 return
             try:
                 step_m = {"+": STEP_M, "-": -STEP_M}.get(answer) or 1e-3 * float(answer)
                 if not abs(step_m) <= LONGEST_M:
-                    raise UsageError(f"{answer} mm is longer than a step may be, {1e3 * LONGEST_M:g} mm.")
+                    raise UsageError(f"A step of {answer} mm is longer than the permitted {1e3 * LONGEST_M:g} mm.")
                 move(step_m)
             except ValueError:
-                say(f"{answer!r} is neither +, - nor a number.")
+                say(f"{answer!r} is neither + nor - nor a number of mm.")
             except TactbenchError as error:
                 say(str(error))
     finally:

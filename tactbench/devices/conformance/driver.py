@@ -1,4 +1,4 @@
-"""Checks of the driver of a sensor or another device, on its emulator in virtual time: no line is opened."""
+"""Checks of a driver of a sensor or another device, run on its emulator in virtual time: no real link is opened."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ STILL_M = 1e-5  # largest movement of a motor at rest: twice an increment of its
 
 
 class _Adapter:
-    """An emulated device behind a serial adapter that delays all but answers, and splits the bytes anywhere.
+    """An emulated device behind a serial adapter that delays all bytes except answers, and splits frames anywhere.
 
-    `change` is applied to each of the device's own pieces.
+    `change` is applied to each piece of bytes that the device sends, before it is split.
     """
 
     def __init__(self, inner: Any, change: Callable[[bytes], bytes]) -> None:
@@ -98,36 +98,36 @@ class Opened(NamedTuple):
     emulator: Any = None
 
     def channels(self) -> list[ChannelSpec]:
-        """Return the channels of all streams."""
+        """Return the channels of all streams of the driver."""
         return [channel for stream in self.driver.streams for channel in stream.channels]
 
     @property
     def slowest_hz(self) -> float:
-        """Rate of the slowest stream."""
+        """Rate of the slowest stream [Hz]; 100 for a stream without a stated rate."""
         return min(stream.rate_hz or 100.0 for stream in self.driver.streams)
 
     @property
     def due_s(self) -> float:
-        """Second at which the emulator sends next without a request; infinite: it does not."""
+        """Time at which the emulator next sends without a request [s]; infinite if it sends nothing by itself."""
         return float(self.emulator.next_s()) if hasattr(self.emulator, "next_s") else math.inf
 
     def call(self, name: str, *given: Any) -> Any:
-        """Call a method of the driver; an error is a failure that names it."""
+        """Call a method of the driver; an error fails the check with the name of the method."""
         with code_of(f"driver.{name}", self.subject):
             return getattr(self.driver, name)(*given)
 
     def read(self, seconds: float = READ_S) -> dict[str, StreamData]:
-        """Read for some time; return the streams."""
+        """Read the driver for `seconds`; return the data joined by stream."""
         return joined("driver.read", self.driver.streams, self.blocks(seconds))
 
     def blocks(self, seconds: float) -> list[Block]:
-        """Read for some time; return the blocks."""
+        """Read the driver for `seconds`; return the blocks received."""
         blocks: list[Block] = []
         until_ns, before_ns, still = self.clock() + round(seconds * 1e9), -1, 0
         while (now_ns := self.clock()) < until_ns:
             still = still + 1 if now_ns == before_ns else 0
             if still > MOST_STILL:
-                fail("driver.read", "time stands still: it returns at once, and waits for nothing")
+                fail("driver.read", "virtual time does not advance: read() returns at once, without a wait in its link")
             before_ns = now_ns
             blocks += self.call("read", WAIT_S)
         return blocks
@@ -138,10 +138,10 @@ def emulated(
     subject: Subject, *faults: str, senses: Senses = lambda t_s: {}, change: Callable[[bytes], bytes] | None = None,
     started: bool = True, before_s: float = BEFORE_S, of_both: Mapping[str, Any] = MappingProxyType({}), **options: Any,
 ) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
-    """Open the driver on its emulator, which has been running for some time, and start it.
+    """Open the driver on its emulator, which has run for `before_s` seconds, and start it if `started`.
 
-    `faults` are the emulator's, `change` is applied to pieces on their way to the driver (in other sizes then),
-    `of_both` are options of driver and emulator, and `options` only the driver's.
+    `faults` apply to the emulator, `change` to each piece of bytes sent to the driver (their sizes change, too),
+    `of_both` are options for driver and emulator, `options` for the driver alone.
     """
     name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults, options=dict(of_both))
     with code_of("emulator", subject):
@@ -165,26 +165,26 @@ def emulated(
 
 @check("sensor", "device", needs="code-names-resolve")
 def driver_opens(subject: Subject) -> None:
-    """A driver is open once it is made, reports an identity, has the spec's streams, and leaves nothing open.
+    """A driver opens its link when constructed, reports an identity, has the spec's streams, and closes its link.
 
-    Open settings.open_link() once in its making and close the link in close(), also when it was sampling; return the
-    streams of settings.streams, and texts from identify(); raise UsageError for options that it does not know.
+    Call settings.open_link() once in the constructor and close the link in close(), also while sampling; return the
+    streams of settings.streams, and texts from identify(); raise UsageError for unknown options.
     """
     descriptor = subject.descriptor
     if descriptor.driver is None:
-        skip("it names no driver: it can be simulated or replayed, not read")
+        skip("its descriptor has no driver: the device can be simulated or replayed, not read")
     if descriptor.emulator is None:
-        skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
+        skip("its descriptor has no emulator: the driver can be checked on a real device only, by `--rig-file FILE`")
     own = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.channels()
     with emulated(subject, started=False) as (opened, devices):
         identity = dict(opened.call("identify"))
         if not all(isinstance(one, str) for pair in identity.items() for one in pair):
-            fail("driver.identify", f"{identity!r}, and texts by name are needed")
+            fail("driver.identify", f"returned {identity!r}; a dict of names and texts is needed")
         strange = [one.name for one in opened.channels() if own and one not in own]
         if strange:
-            fail("driver.streams", f"the spec has no such channel as {strange[0]}")
+            fail("driver.streams", f"the channel {strange[0]} is not in the spec")
         opened.call("start")
-        with code_of("driver.close: it must be possible to open its link again", subject):
+        with code_of("driver.close: the link could not be opened again after close()", subject):
             opened.driver.close()
             opened.driver.close()
             devices.open_link(subject.name).close()
@@ -195,15 +195,15 @@ def driver_opens(subject: Subject) -> None:
         if isinstance(failure.__cause__, UsageError):
             return
         raise
-    fail("driver", "it accepts an unknown option, 'no_such_option'")
+    fail("driver", "the driver accepts an unknown option, 'no_such_option', instead of raising UsageError")
 
 
 @check("sensor", "device", needs="driver-opens")
 def driver_reads(subject: Subject) -> None:
-    """Rows have the host's time in nanoseconds, come at the rate that the driver states, and each of them once.
+    """Rows have the host's time in nanoseconds, come at the rate that the driver states, and none comes twice.
 
-    Stamp with Received.t_ns or settings.clock(), both int64 nanoseconds; take everything that has come at each read,
-    and return an empty list where nothing new has: a device that is polled for its last row may send it twice.
+    Give rows the time Received.t_ns or settings.clock(), both int64 nanoseconds; return all rows received at each read,
+    and an empty list if there is no new row: a device that is polled for its last row may send the same row twice.
     """
     every: list[ChannelSpec] = []
 
@@ -215,11 +215,11 @@ def driver_reads(subject: Subject) -> None:
         for name, stream in look_at(opened).items():
             again = float((np.diff(stream.data, axis=0) == 0).all(axis=1).mean())
             if again > STALE and getattr(subject.descriptor, "kind", "") != "motor":
-                fail(f"driver.read: {name}", f"{again:.0%} of its rows are the one before once more, with a new time")
+                fail(f"driver.read: {name}", f"{again:.0%} of the rows repeat the previous row with a new time")
 
 
 def look_at(opened: Opened) -> dict[str, StreamData]:
-    """Start a driver, read it for a while, and return the streams; fail where their times are wrong."""
+    """Start a driver, read it for `RATED_S`, and return the streams; fail the check if times of rows are wrong."""
     opened.call("start")
     opened.read(WAIT_S)
     began_ns = opened.clock()
@@ -228,14 +228,14 @@ def look_at(opened: Opened) -> dict[str, StreamData]:
     opened.driver.stop()
     for name, stream in found.items():
         if not len(stream.data):
-            fail("driver.read", f"nothing came of its stream {name} within {RATED_S:g} s")
+            fail("driver.read", f"no data of stream {name} came within {RATED_S:g} s")
         times_are_right(f"driver.read: {name}", stream, (ended_ns - began_ns) * 1e-9, LATE, ended_ns)
         _clock_is_right(f"driver.read: {name}.device_ns", stream)
     return found
 
 
 def _clock_is_right(where: str, stream: StreamData) -> None:
-    """Fail where the device's own clock is in another unit, has another rate than the host's, or steps."""
+    """Fail the check if the device's clock is not in nanoseconds, differs in rate from the host's clock, or jumps."""
     if stream.device_ns is None or stream.t_ns is None or len(stream.t_ns) < LEAST_ROWS:
         return
     host_s, device_s = (1e-9 * (one - one[0]).astype(np.float64) for one in (stream.t_ns, stream.device_ns))
@@ -243,14 +243,14 @@ def _clock_is_right(where: str, stream: StreamData) -> None:
     rate = float(np.polyfit(host_s, device_s, 1)[0])
     most = int(np.argmax(steps))
     if steps[most] > CLOCK_STEP_S:
-        text = f"it rises by {device_s[most + 1] - device_s[most]:.4g} s in {host_s[most + 1] - host_s[most]:.4g} s"
-        fail(where, f"{text}: is it unwrapped?")
+        text = f"rises by {device_s[most + 1] - device_s[most]:.4g} s in {host_s[most + 1] - host_s[most]:.4g} s"
+        fail(where, f"the clock {text}: is its counter unwrapped?")
     if abs(rate - 1) > CLOCK_SHARE:
-        fail(where, f"it counts {rate:.4g} s in a second of the host's clock: is it in nanoseconds?")
+        fail(where, f"the clock counts {rate:.4g} s per second of the host: is it in nanoseconds?")
 
 
 def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
-    """Return a reading at some share of the middle of a channel's range, and a tolerance; forces have both signs."""
+    """Return a test reading in a channel's range, `share` (0 to 1) of the way up, and its tolerance."""
     low, span, rounding = 1.0, LEVELS - 1.0, 0.0
     lower, upper = limits_of(one)
     if np.isfinite(upper - lower):
@@ -265,14 +265,14 @@ def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
 
 def _skip_motor(subject: Subject) -> None:
     if getattr(subject.descriptor, "kind", "") == "motor":
-        skip("the position of a motor is its rig's")
+        skip("the position of a motor is set by its rig, not by a test reading")
 
 
 @check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
-    """Swapped channels or bytes, a lost sign or gram-force give plausible readings of something else.
+    """Swapped channels or bytes, a lost sign or a wrong unit (gram-force) give plausible but wrong readings.
 
-    Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
+    Decode into the order and units of the stream's channels; the emulator must encode the readings of its senses.
     """
     _skip_motor(subject)
     place, sensed = 1, dict[str, float]()
@@ -290,27 +290,27 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
                     if abs(value - expected) <= near:
                         continue
                     others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
-                    guess = f", which is what {others[0]} senses" if others else ""
+                    guess = f", which is the reading of {others[0]}" if others else ""
                     if not others and abs(value + expected) <= near:
-                        guess = ": is its sign turned?"
+                        guess = ": is the sign reversed?"
                     elif not others and channel.unit == "N":
                         guess = likely(value / expected)
-                    text = f"{value:.4g} where {expected:.4g} {channel.unit} are sensed{guess}"
+                    text = f"read {value:.4g}, expected {expected:.4g} {channel.unit}{guess}"
                     fail(f"driver.read: {name}.{channel.name}", text)
             place *= LEVELS
 
 
 @check("sensor", "device", needs="driver-reads")
 def driver_decodes_the_manual(subject: Subject) -> None:
-    """A byte order or a scale that is wrong in both driver and emulator shows in a frame of the maker's manual alone.
+    """A byte order or scale that is wrong in both driver and emulator is detected only by a frame from the manual.
 
-    Copy one frame and its readings from the maker's manual into `manual_frame` of the descriptor, and decode it.
+    Copy one frame and its readings from the maker's manual into the descriptor's `manual_frame`.
     """
     frame = subject.descriptor.manual_frame
     if frame is None:
-        skip("manual_frame is empty: what driver and emulator have in common is not compared with the maker's manual")
+        skip("manual_frame is empty: errors common to driver and emulator remain undetected")
     if subject.descriptor.emulated_link != "bytes":
-        skip("its link is no stream of bytes")
+        skip("its link is not a stream of bytes")
     data = [b""]
     with emulated(subject, change=lambda piece: data[0] or piece) as (opened, _):
         opened.read()
@@ -321,18 +321,18 @@ def driver_decodes_the_manual(subject: Subject) -> None:
     for name, meant in frame.readings.items():
         read = found.get(name, math.nan)
         if not math.isclose(read, meant, rel_tol=1e-6, abs_tol=1e-9):
-            fail(f"manual_frame.readings[{name}]", f"{meant:g} by the manual, and the driver gives {read:g}")
+            fail(f"manual_frame.readings[{name}]", f"expected {meant:g} by the manual, the driver reads {read:g}")
 
 
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_takes_any_pieces(subject: Subject) -> None:
-    """A serial port delivers half a frame or several at once, and cables lose bytes, which must not become a reading.
+    """A serial port may deliver parts of frames or several at once; frames with lost bytes must not become readings.
 
     Keep the rest of a frame for the next read, and take all whole frames. Check a frame's length, end or checksum, drop
     a damaged one and find the next beginning; count it in `counts` or mark it as SUSPECT.
     """
     if subject.descriptor.emulated_link != "bytes":
-        skip("its link hands over whole frames")
+        skip("its link delivers whole frames")
     seen, lost = itertools.count(), 0
 
     def damaged(data: bytes) -> bytes:
@@ -351,41 +351,41 @@ def driver_takes_any_pieces(subject: Subject) -> None:
     for name, stream in sound.items():
         where, came, whole, values = f"driver.read: {name}", len(cut[name].data), len(stream.data), good(found[name])
         if came < (0.9 - HELD_S / READ_S) * whole - 2:
-            fail(where, f"{came} rows where frames come in pieces or several at once, {whole} where each comes whole")
+            fail(where, f"{came} rows from frames in pieces or several at once, {whole} from whole frames one by one")
         if not len(values):
-            fail(where, "no row comes where frames are damaged now and then")
+            fail(where, "no row is read if some frames are damaged")
         low, high = stream.data.min(axis=0), stream.data.max(axis=0)
         near = 3 * (high - low + 1) + 0.05 * np.abs(high)
         wrong = values[((values < low - near) | (values > high + near)).any(axis=1)]
         # A checksum of 8 bits fits a damaged frame once in 256 times.
         if len(wrong) > max(1, UNLUCKY * damages):
-            text = f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong.flat[np.abs(wrong).argmax()]:g}"
+            text = f"a frame without {DAMAGE} of its bytes is read as whole: {wrong.flat[np.abs(wrong).argmax()]:g}"
             fail(where, text)
         noticed |= bool(np.isnan(values).any())
     if not noticed:
-        fail("driver.counts", "frames were damaged, and neither counted nor marked")
+        fail("driver.counts", "damaged frames were neither counted in `counts` nor marked as SUSPECT")
 
 
 def _counters(emulator: Any) -> dict[str, int]:
-    """Return the counters of an emulator, by attribute: whole numbers, and the next of ``itertools.count``."""
+    """Return an emulator's counters by attribute name: whole numbers and the next values of ``itertools.count``."""
     texts = {name: re.fullmatch(r"(?:count\()?(\d+)\)?", repr(one)) for name, one in vars(emulator).items()}
     return {name: int(found[1]) for name, found in texts.items() if found and name != "_rows"}  # the base class's clock
 
 
 @check("sensor", "device", needs="driver-reads")
 def driver_counts_on(subject: Subject) -> None:
-    """Counters and clocks wrap; rows after a wrap that is not unwrapped look late, and are left out.
+    """Counters and clocks of devices overflow to 0; unless unwrapped, later rows seem late and are dropped.
 
     Unwrap counters of 8, 16 or 32 bits: tactbench.plugin.devices.Unwrap(bits).
     """
 
     def counted(opened: Opened, seconds: float) -> int:
-        """Read, fail where numbers do not rise by one, and return the number of rows."""
+        """Read, fail if row numbers do not rise by one, and return the number of rows."""
         found = opened.read(seconds)
         for name, stream in found.items():
             for a, b in itertools.pairwise(() if stream.sequence is None else stream.sequence.tolist()):
                 if b != a + 1:
-                    fail(f"driver.read: {name}.sequence", f"{a} is followed by {b}, and no row was lost")
+                    fail(f"driver.read: {name}.sequence", f"row {a} is followed by row {b}, and no row was lost")
         return max(len(stream.data) for stream in found.values())
 
     with emulated(subject, started=False) as (opened, _):
@@ -394,7 +394,7 @@ def driver_counts_on(subject: Subject) -> None:
         first, before = opened.read().values(), _counters(opened.emulator)
         clocked, numbered = (any(getattr(one, name) is not None for one in first) for name in ("device_ns", "sequence"))
         if not clocked and not numbered:
-            skip("its device numbers no samples, and has no clock")
+            skip("the device has neither sample numbers nor a clock")
         some_s, until_s = 4 * BEFORE_WRAP / opened.slowest_hz, time.process_time() + WORK_S
         rows, now = counted(opened, READ_S + some_s), _counters(opened.emulator)
         moved = [one for one, value in now.items() if abs(value - before.get(one, value) - rows) <= 0.1 * rows]
@@ -406,7 +406,7 @@ def driver_counts_on(subject: Subject) -> None:
                 counted(opened, some_s)
         while numbered and not moved and rows < WRAP_ROWS:
             if time.process_time() > until_s:
-                skip(f"its counter did not wrap within {rows} rows, {WORK_S:g} s of a processor")
+                skip(f"the counter did not overflow within {rows} rows or {WORK_S:g} s of processor time")
             rows += counted(opened, READ_S)
     for wraps_s in CLOCK_WRAPS_S if clocked and quiet else ():
         with emulated(subject, before_s=wraps_s - 1.0) as (opened, _):
@@ -416,7 +416,7 @@ def driver_counts_on(subject: Subject) -> None:
 
 @check("sensor", "device", needs="driver-reads")
 def driver_waits_and_stops(subject: Subject) -> None:
-    """A rig reads several devices in turn: one read that takes too long makes the rows of all others late.
+    """A rig reads several devices in turn: a read that takes too long makes the rows of the other devices late.
 
     Wait only in the link, and no longer than `timeout_s` in all; never sleep. Let the device stop in stop().
     """
@@ -428,28 +428,28 @@ def driver_waits_and_stops(subject: Subject) -> None:
             opened.call("read", wait_s)
             took_s = (opened.clock() - began_ns) * 1e-9
             if took_s > wait_s + SHORT_S:
-                fail("driver.read", f"read({wait_s:g}) took {took_s:.2g} s")
+                fail("driver.read", f"read({wait_s:g}) took {took_s:.2g} s, longer than its timeout")
         spent = [(time.perf_counter(), time.thread_time())]
         for _ in range(TRIES):
             opened.driver.read(0.0)
             spent.append((time.perf_counter(), time.thread_time()))
         wall_s, busy_s = min((b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(spent))
         if wall_s > SLEEP_S and busy_s < wall_s / 2:
-            fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s")
+            fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s; it must return at once")
         opened.call("stop")
         devices.advance(opened.clock() + round(1e9 * WAIT_S))
         # Of some devices no source says how they are stopped.
         own = getattr(type(opened.driver), "quiet", None)
         if (quiet if own is None else own is not RowDriver.quiet) and math.isfinite(opened.due_s):
-            fail("driver.stop", "the device goes on sending after it")
+            fail("driver.stop", "the device still sends after stop()")
 
 
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_follows_a_step(subject: Subject) -> None:
-    """A filter that is not stated makes every answer late, and rows before the first whole one read zeros.
+    """A filter that is not stated makes every reading late, and rows before the first complete sample read zero.
 
-    State the delay of a filter in `link_delay`; return no row before the device has one, or mark it as MISSING; keep
-    the rows of a block in the order of their time.
+    State the delay of a filter in `link_delay`; return no row before the device's first sample, or mark it as MISSING;
+    keep the rows of a block in the order of their time.
     """
     _skip_motor(subject)
     steps_s = list[float]()
@@ -474,19 +474,19 @@ def driver_follows_a_step(subject: Subject) -> None:
         if len(before) in (0, len(found)):  # a stream that gives no steady level
             continue
         if abs(found[0]) > STEP[0]:
-            fail(f"driver.read: {name}", "its first row is not what is sensed: is it of before the first sample?")
+            fail(f"driver.read: {name}", "the first row is not as sensed: was it made before the first sample?")
         late_s = float(times[min(int(before[-1]) + 1, len(found) - 1)]) - steps_s[0]
         batch = max(len(one.data) for one in blocks if one.stream == name)
         if late_s > (LAG_ROWS + batch) * np.ptp(times) / len(found) + LAG_S + (
             0.0 if stated is None else stated.to("s")
         ):
-            fail(f"driver.read: {name}", f"a step comes {late_s:.2g} s late: is there a filter? State link_delay")
+            fail(f"driver.read: {name}", f"a step is {late_s:.2g} s late: state the delay of a filter in link_delay")
         if (np.diff(_shares(late[name])[0]) > STEP[0]).any():
-            fail(f"driver.read: {name}", "the rows of a block are not in the order of their time")
+            fail(f"driver.read: {name}", "rows of one block are not in order of time")
 
 
 def _shares(stream: StreamData) -> tuple[FloatArray, FloatArray]:
-    """Return the rows that have readings: (n,) shares of the way between the levels of a step, and (n,) times [s]."""
+    """Return the finite readings as (n,) shares of a step, 0 its lower and 1 its upper level, and (n,) times [s]."""
     low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
     found = np.asarray(((good(stream) - low) / (high - low)).mean(axis=1))
     whole = np.isfinite(found) & (stream.t_ns is not None)
@@ -496,10 +496,10 @@ def _shares(stream: StreamData) -> tuple[FloatArray, FloatArray]:
 
 @check("sensor", "device", needs="driver-reads")
 def driver_reports_what_happens(subject: Subject) -> None:
-    """Data from before the start are no reading, and a line that is gone is an error.
+    """Data received before start() must be dropped, and an unplugged line must raise an error.
 
-    Discard in start() the data that wait in the link (Link.discard), and the beginning of a frame. Return an empty list
-    when the link raises LinkTimeout, and let LinkUnplugged pass.
+    Discard in start() the data waiting in the link (Link.discard) and any partial frame. Return an empty list from
+    read() when the link raises LinkTimeout, and do not catch LinkUnplugged.
     """
     with emulated(subject, f"unplug:start_s={GONE_AT_S:g}", started=False) as (opened, devices):
         for _ in range(2):
@@ -509,7 +509,7 @@ def driver_reports_what_happens(subject: Subject) -> None:
             for name, stream in opened.read().items():
                 early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
                 if early_s > 0:
-                    fail("driver.start", f"a row of {name} is from {early_s:.2g} s before it was started")
+                    fail("driver.start", f"a row of stream {name} has a time {early_s:.2g} s before start()")
             opened.driver.stop()
         opened.call("start")
         try:
@@ -519,27 +519,27 @@ def driver_reports_what_happens(subject: Subject) -> None:
                 return
             if failure.__cause__ is not None:
                 raise
-    fail("driver.read", "it returns empty lists as if its line was silent, once the line is gone")
+    fail("driver.read", "returns empty lists after the line was unplugged; let LinkUnplugged pass")
 
 
 @check("device", needs="driver-reads")
 def device_is_fit_for_a_rig(subject: Subject) -> None:
-    """A rig assumes newtons and metres, marks at the end of a range, and a motor that stands still until it is moved.
+    """A rig needs newtons and metres, marks for readings out of range, and a motor at rest until commanded.
 
     Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert. Mark the end of a range
-    as SATURATED. Leave a motor where it is, and without power, in the driver's making, identify(), start() and read().
+    as SATURATED. Do not move or power a motor in the driver's constructor, identify(), start() and read().
     """
     device, sensed = subject.descriptor.kind, dict[str, float]()
     kind, unit = ("force", "N") if device == "force" else ("position", "m")
     if device not in ("force", "motor"):
-        skip(f"it is a {device} device")
+        skip(f"a device of kind {device} is neither force sensor nor motor")
     with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
         own = [one for one in opened.channels() if one.kind == kind]
         for channel in own:
             if channel.unit != unit:
-                fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
+                fail(f"driver.streams: {channel.name}.unit", f"the unit is {channel.unit!r}, {unit!r} is needed")
         if not own:
-            fail("driver.streams", f"none of its channels is of kind {kind}")
+            fail("driver.streams", f"no channel of the device is of kind {kind}")
 
         sensed.update({one.name: OVERLOAD_N for one in own if kind == "force"})
         opened.read()
@@ -551,6 +551,6 @@ def device_is_fit_for_a_rig(subject: Subject) -> None:
                 there = good(stream)[:, column]
                 there = there[np.isfinite(there)]  # none before an axis is homed
                 if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
-                    fail(where, f"it changes by {1e3 * moved_m:.3g} mm without a move")
+                    fail(where, f"the position changes by {1e3 * moved_m:.3g} mm without a move")
                 if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
-                    fail(where, f"it is not marked SATURATED under {OVERLOAD_N:g} N")
+                    fail(where, f"rows are not marked SATURATED at {OVERLOAD_N:g} N")

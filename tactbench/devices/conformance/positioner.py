@@ -1,4 +1,4 @@
-"""Checks of an axis that moves, on its emulator in virtual time: the driver's position against the emulator's."""
+"""Checks of an axis' driver on its emulator in virtual time: the driver's position is compared with the emulator's."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from tactbench.devices.positioner import NotReadyError, Positioner
 
 PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
 PACE = {"speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-5, "retreat_speed_m_s": 5e-3}
-"""Options of the axis where its descriptor's `emulated_options` state no others; homing finds the lower end."""
+"""Default options of the axis, used if `emulated_options` of its descriptor lack them; homing finds the lower end."""
 HOMING_S, MOVE_S = 120.0, 2.0  # timeouts (assumed: 100 mm at 1 mm/s, and back); a long axis is moved over a part of it
 LOOK_S, REST_S = 1e-3, 0.3  # time between two looks at a moving axis; time for which it must stand after a move
 
 
 class _Axis(NamedTuple):
-    """An axis that is started, and its emulator's position."""
+    """A started axis with its emulator, whose position is the true one."""
 
     opened: Opened
     devices: EmulatedDevices
 
     @property
     def driver(self) -> Any:
-        """The driver, a Positioner."""
+        """Driver of the axis, a Positioner."""
         return self.opened.driver
 
     def true_m(self) -> float:
-        """Return the position of the emulator [m]."""
+        """Return the emulated axis' true position [m]."""
         return float(self.opened.emulator.position_m)
 
     def stretch(self) -> tuple[float, float]:
-        """Return the ends of a part of its travel, at most `MOVE_S` long, that contains its position."""
+        """Return the ends [m] of a part of the travel with the present position, at most a move of `MOVE_S` long."""
         (low, high), speed = self.driver.facts.limits, self.driver.facts.speed
         length = min(high - low, MOVE_S * speed)
         begin = min(max(low, self.driver.position), high - length)
         return begin, begin + length
 
     def wait(self, seconds: float, until: Callable[[], bool]) -> None:
-        """Let time pass until a condition holds, at most some seconds."""
+        """Update the driver until the condition `until` is true, at most for `seconds`."""
         end_ns = self.devices.clock() + round(1e9 * seconds)
         while not until() and (before_ns := self.devices.clock()) < end_ns:
             self.opened.call("update", LOOK_S)
@@ -50,7 +50,7 @@ class _Axis(NamedTuple):
                 self.devices.advance(before_ns + round(1e9 * LOOK_S))
 
     def ended(self, what: str, target_m: float, seconds: float) -> None:
-        """Wait for the end of a move; fail unless axis and driver are then at its target, and stay."""
+        """Wait for the end of a move; fail unless axis and driver then report its target [m], and remain there."""
         began_m = self.true_m()
         self.wait(seconds, lambda: not self.driver.moving)
         there_m = self.true_m()
@@ -58,11 +58,11 @@ class _Axis(NamedTuple):
         for where, at_m in ((what, there_m), (what, self.true_m()), ("driver.position", self.driver.position)):
             if not abs(at_m - target_m) <= self.driver.facts.near:
                 turned = (at_m - began_m) * (target_m - began_m) < 0
-                guess = ": is its direction reversed?" if turned else ""
-                fail(where, f"the axis is at {at_m:.6g} m where {target_m:.6g} m are expected{guess}")
+                guess = ": is the axis' direction reversed?" if turned else ""
+                fail(where, f"the axis is at {at_m:.6g} m, expected {target_m:.6g} m{guess}")
 
     def refused(self, target_m: float, why: str) -> None:
-        """Fail unless a move is refused by NotReadyError, and nothing moves."""
+        """Fail unless the driver refuses a move by NotReadyError."""
         before_m = self.true_m()
         try:
             self.opened.call("move_to", target_m)
@@ -72,20 +72,20 @@ class _Axis(NamedTuple):
             return
         self.wait(REST_S, lambda: False)
         moved = f"the axis moves by {1e3 * (self.true_m() - before_m):.3g} mm"
-        fail("driver.move_to", f"it takes {target_m:g} m {why}; {moved}: call check_move() before anything is sent")
+        fail("driver.move_to", f"accepts a move to {target_m:g} m {why}; {moved}: call check_move() before sending")
 
 
 @contextmanager
 def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     kind = subject.code("driver")
     if not (isinstance(kind, type) and issubclass(kind, Positioner)):
-        skip("it is no Positioner")
+        skip("the driver is not a Positioner, so it moves no axis")
     own = subject.descriptor.emulated_options
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
     with emulated(subject, of_both=given) as (opened, devices):
         if not hasattr(opened.emulator, "position_m"):
-            fail("emulator", "it has no `position_m`, the position of the axis as its driver counts [m]")
+            fail("emulator", "the emulator lacks `position_m`, the axis' position [m] as its driver counts")
         axis = _Axis(opened, devices)
         if homed:
             _home(axis)
@@ -101,54 +101,54 @@ def _home(axis: _Axis) -> None:
 
 @check("device", needs="driver-reads")
 def axis_is_homed(subject: Subject) -> None:
-    """Before homing a position is unknown, and after it ceiling, ends of travel and retreat depend on it.
+    """Before homing the position is unknown; force ceiling, ends of travel and retreat all depend on the home.
 
-    State resolution_m and stop_latency_s; refuse moves until home() has set `homed` (check_move); the place that homing
-    finds is at `home_m`; let home() return only once the axis stands.
+    State resolution_m and stop_latency_s; refuse moves by check_move() until home() has set `homed`; count the place
+    found by homing as `home_m`; let home() return only when the axis stands still.
     """
     with _axis(subject, homed=False) as axis:
         facts = axis.driver.facts
         if not (facts.resolution > 0 and facts.stop_latency_s >= 0 and facts.limits[0] < facts.limits[1]):
-            fail("driver.facts", f"resolution, stop latency and ends of travel are not all stated: {facts}")
+            fail("driver.facts", f"state resolution, stop latency and both ends of travel; given are {facts}")
         if not axis.driver.homed:
-            axis.refused(sum(facts.limits) / 2, "before it is homed")
+            axis.refused(sum(facts.limits) / 2, "before the axis is homed")
         _home(axis)
         axis.ended("driver.home", axis.driver.position, facts.seconds(0.0, facts.speed))
 
 
 @check("device", needs="axis-is-homed")
 def axis_goes_where_it_is_sent(subject: Subject) -> None:
-    """A reversed direction, another unit or ends of travel that are not kept drive an indenter through a sensor.
+    """A reversed direction, a wrong unit or ignored ends of travel can drive an indenter through a sensor.
 
-    Positions are metres, those of a pressing axis positive into the skin. Call check_move() before a move is sent,
-    begin() after, and see() with each answer; end a move only where the controller stands at its target.
+    Positions are metres, those of a pressing axis positive into the skin. Call check_move() before sending a move,
+    begin() afterwards, and see() with each answer; report the end of a move only when the controller is at the target.
     """
     with _axis(subject) as axis:
         facts = axis.driver.facts
         (low, high), speed = axis.stretch(), facts.speed
         for share in (0.5, 0.8, 0.3):
             target_m = axis.opened.call("move_to", low + share * (high - low))
-            axis.refused(target_m, "while it moves")
+            axis.refused(target_m, "during another move")
             axis.ended("driver.move_to", target_m, facts.seconds(high - low, speed))
         step_m = 0.05 * (high - low)
         axis.opened.call("move_by", step_m)
         axis.ended("driver.move_by", target_m + step_m, facts.seconds(step_m, speed))
         low, high = facts.limits
         for beyond_m in (low - step_m, high + step_m, math.nan, math.inf):
-            axis.refused(beyond_m, f"beyond its ends of travel, {low:g} to {high:g} m")
+            axis.refused(beyond_m, f"beyond the ends of travel, {low:g} to {high:g} m")
 
 
 @check("device", needs="axis-goes-where-it-is-sent")
 def axis_halts_and_retreats(subject: Subject) -> None:
-    """The force is bounded by how soon a move ends: the guard computes with `stop_latency_s` and the acceleration.
+    """The largest force depends on the way to a stop, which is computed from `stop_latency_s` and acceleration.
 
-    Let halt() and retreat() replace the move that is under way, within the latency that the axis states; state a longer
-    one where the controller needs it, or interruptible = False where it ends every move.
+    Let halt() and retreat() replace a move under way within the latency that the axis states; state a longer latency
+    if the controller needs more, or interruptible = False if the controller completes every move.
     """
     with _axis(subject) as axis:
         driver, facts = axis.driver, axis.driver.facts
         if not facts.interruptible:
-            skip("it says that a move cannot be interrupted")
+            skip("the axis states that its moves cannot be interrupted")
         (low, high), v = axis.stretch(), facts.speed
         most_m = v * (facts.stop_latency_s + 2 * LOOK_S) + v**2 / (2 * facts.acceleration) + facts.near
         for name, goal_m in (("halt", high), ("halt", low), ("retreat", high)):
@@ -164,6 +164,6 @@ def axis_halts_and_retreats(subject: Subject) -> None:
             # The condition is looked at in each step of the wait.
             axis.wait(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
             if (on_m := max(furthest) - furthest[0]) > most_m:
-                text = f"it goes on by {1e3 * on_m:.3g} mm, and {1e3 * most_m:.3g} mm follow"
-                fail(f"driver.{name}", f"{text} from the stop latency and the acceleration that it states")
+                text = f"the axis goes on by {1e3 * on_m:.3g} mm, at most {1e3 * most_m:.3g} mm follow"
+                fail(f"driver.{name}", f"{text} from its stated stop latency and acceleration")
             axis.ended(f"driver.{name}", axis.true_m() if stays else facts.retreat, seconds)

@@ -1,6 +1,6 @@
-"""Checks of the real devices of a rig file, which are read or press.
+"""Checks of the real devices and the real rig of a rig file: devices are read, the rig presses.
 
-They run in the process of the command, so that Ctrl-C reaches the rig, and without a limit of time.
+These checks run in the command's own process, so that Ctrl-C reaches the rig, and without a time limit.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ NOISY = 3.0  # factor by which a unit's noise may differ from the stated one (as
 
 def _file(subject: Subject) -> RigFile:
     if subject.rig_file is None:
-        skip("no rig file is given: `--rig-file FILE` names the devices")
+        skip("no rig file is given; add `--rig-file FILE`")
     return load_rig_file(subject.rig_file, subject.registry)
 
 
 @check("sensor", "device", mode="invasive", needs="code-names-resolve")
 def real_device_answers(subject: Subject) -> None:
-    """The emulator is the author's model of the device; rate and noise at rest are measured on the device.
+    """An emulator is only the author's model of a device; rate and noise at rest are measured on the real device.
 
-    Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and identities.
+    Let nothing touch the device. `tactbench doctor --rig-file FILE` shows ports, permissions and identities.
     """
     file = _file(subject)
     if subject.descriptor.driver is None:
-        skip("it names no driver")
+        skip("its descriptor has no driver")
     named = {getattr(one, "device", name): one for name, one in file.entries().items()}
     if subject.name not in named:
-        fail(str(subject.rig_file), f"it has no entry for {subject.name}")
+        fail(str(subject.rig_file), f"the rig file has no entry for {subject.name}")
     entry = named[subject.name]
     if entry.emulated:
         skip("the device is emulated in the rig file")
@@ -68,26 +68,26 @@ def real_device_answers(subject: Subject) -> None:
             hidden, seen = stated.hidden(), channel.kind == "force" or stated.white.value > stated.step.value / 2
             if (seen and sd <= hidden / NOISY) or (hidden and sd > NOISY * hidden):
                 text = (
-                    f"its noise at rest is {sd:.3g} {channel.unit} (sd)"
+                    f"the noise at rest is {sd:.3g} {channel.unit} (standard deviation)"
                     if sd
-                    else "it is constant at rest: is it connected?"
+                    else "the channel is constant at rest: is it connected?"
                 )
                 fail(f"driver.read: {name}.{channel.name}", f"{text}; spec.nuisances states {hidden:.3g}")
 
 
 def _zeros(drawn: Mapping[str, Any]) -> list[float]:
-    """Return the zeros of the reference's channels, from the facts of PressingForce.about."""
+    """Return the zeros of the force sensor's channels, as noted in the recording by PressingForce.about."""
     texts = [str(text) for name, text in sorted(drawn.items()) if name.startswith("zero of ")]
     return [float(one) for text in texts for one in text.split(",")]
 
 
 @check("rig", mode="invasive", needs="code-names-resolve")
 def real_rig_presses(subject: Subject) -> None:
-    """Estimators learn the recorded force: it must not be late, of another sign or too large, nor remain afterwards.
+    """The recorded force must not be late, reversed or too large, and must return to zero after a press.
 
-    Look at `tactbench doctor --rig-file FILE` for limits, at the sign and unit of the force sensor in the rig file,
-    then at the gains of the force loop. Retreat at the end of each scene, also of one that failed; let `stop` retreat,
-    wait for its end, and return "" or what is to be done by hand.
+    Check limits by `tactbench doctor --rig-file FILE`, then sign and unit of the force sensor in the rig file, then the
+    gains of the force loop. Retreat at the end of each scene, even after a failure; let `stop` retreat, wait until the
+    retreat has ended, and return "" or the instruction for the operator.
     """
     file, first = _file(subject), list[Any]()
     if file.rig != subject.name:
@@ -126,6 +126,6 @@ def real_rig_presses(subject: Subject) -> None:
     off = np.subtract(_zeros(acquisition.drawn), _zeros(made.meta.drawn))
     off_n = max([held[: max(1, len(held) // 5)].mean(), *off], key=abs)
     if abs(off_n) > FORCE_SHARE * REAL_N:
-        fail("open", f"the force or its zero is {off_n:.3g} N off when the next press begins, before anything touches")
+        fail("open", f"the force or its zero is {off_n:.3g} N off at the start of the next press, before contact")
     if message or (len(left) and abs(left.mean()) > FORCE_SHARE * REAL_N):
-        fail("stop", message or f"{left.mean():.3g} N are left after it has returned")
+        fail("stop", message or f"{left.mean():.3g} N are left after the retreat")

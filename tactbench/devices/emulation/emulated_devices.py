@@ -1,4 +1,4 @@
-"""Emulated devices on one clock: in virtual time, or in real time on links of the system."""
+"""Emulated devices on one common clock: in virtual time, or in real time on links of the operating system."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from tactbench.links.link import Clock, Link
 from tactbench.links.spi_bridge import SpiBridge
 
 SPI_HZ = 4_400_000
-"""Clock of an emulated SPI bus: what the BioTac's maker's tools use [sourced: docs/links.md]; the bus takes any up to
-10 MHz."""
+"""Clock of an emulated SPI bus [Hz]: that of the BioTac maker's own tools [sourced: docs/links.md]; the bus takes up
+to 10 MHz."""
 HELD = 8
-"""Batches that an emulated bridge holds, as the firmware of docs/links.md does."""
+"""Number of batches that an emulated SPI bridge stores, equal to that of the firmware in docs/links.md."""
 BAUD = 3_000_000
-"""Rate in the address of a serial line [bit/s]: above that of any device, since a pseudo-terminal has none."""
+"""Rate in the address of a serial line [bit/s]: above that of any device; pseudo-terminals have no rate."""
 
 
 @dataclass(frozen=True)
 class EmulatedDevice:
-    """Device as a model, and the kind of its link."""
+    """Model of a device, with the kind and the faults of its link."""
 
     link: EmulatedLink
     emulator: DeviceEmulator | SpiDeviceEmulator
-    """SpiDeviceEmulator on `spi`, DeviceEmulator on the others."""
+    """SpiDeviceEmulator for the link kind `spi`, DeviceEmulator for other kinds."""
     faults: tuple[LinkFault, ...] = ()
-    """Faults of the link; the device's own are in its emulator."""
+    """Faults of the link; faults of the device itself are in its emulator."""
     baud: int | None = None
-    """Rate of a serial line [bit/s], for its address; None: `BAUD`."""
+    """Bit rate in the address of a serial line [bit/s]; None: `BAUD`."""
 
 
 class EmulatedDevices:
-    """Emulated devices that run until :meth:`close` or the end of the ``with`` block.
+    """Running emulated devices, until :meth:`close` or the end of the ``with`` block.
 
     Parameters
     ----------
@@ -61,15 +61,15 @@ class EmulatedDevices:
     Attributes
     ----------
     clock
-        Nanoseconds since the devices began, for drivers and links; the seconds of emulators, faults and senses are the
-        same time.
+        Nanoseconds since the devices began, for drivers and links; emulators, faults and senses use the same time
+        in seconds.
     addresses
-        Address of the link by device, for a rig file, also of another process; empty in virtual time.
+        Link address by device name, for a rig file, also for use by another process; empty in virtual time.
 
     Raises
     ------
     UsageError
-        If this system has no link of that kind.
+        If this operating system lacks the needed kind of link.
     """
 
     def __init__(
@@ -109,17 +109,17 @@ class EmulatedDevices:
             self._whole()
 
     def close(self) -> None:
-        """End the devices and release the links of the system; a second call does nothing."""
+        """End the devices and release the operating system's links; a second call does nothing."""
         if self._server is not None:
             self._server.close()
 
     def advance(self, until_ns: int) -> None:
-        """Advance until `clock` is at a nanosecond: computed in virtual time, waited for in real time.
+        """Advance until `clock` has reached `until_ns`: by simulation in virtual time, by waiting in real time.
 
         Raises
         ------
         Exception
-            The error of an emulator, in real time also one since the last call.
+            The error of an emulator; in real time also an earlier error, raised since the last call.
         """
         if self._virtual is not None:
             self._virtual.advance(until_ns)
@@ -129,12 +129,12 @@ class EmulatedDevices:
         self._whole()
 
     def open_link(self, name: str) -> Link:
-        """Open the host's end of a device's link.
+        """Open the host's end of a device's link, for its driver.
 
         Raises
         ------
         LinkError
-            If it cannot be opened, or is open.
+            If the link cannot be opened, or is open already.
         """
         if self._virtual is None:
             return open_link(self.addresses[name], self.clock)
@@ -153,7 +153,7 @@ class EmulatedDevices:
 
 
 def _far_end(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
-    """Return the far end of a line: an SPI device behind a bridge, in real time a CAN device behind an adapter."""
+    """Return the device's end of a link: an SPI device gets a bridge, in real time a CAN device gets an adapter."""
     emulator: Any = device.emulator
     if device.link == "spi":
         emulator = BridgeEmulator(emulator.exchange, holds=HELD)

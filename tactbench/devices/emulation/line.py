@@ -1,4 +1,4 @@
-"""The far end of one emulated link: the device as a model, and the faults of the link."""
+"""The device's end of one emulated link: a model of the device, and the faults of the link."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from tactbench.devices.emulator import LINK_FAULTS, DeviceEmulator, Fault, Sent
 from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame
-"""Bytes of a stream, a CAN frame, a datagram."""
+"""One transmitted piece of data: bytes of a stream, a CAN frame, or a datagram."""
 
 _AGAIN_S = 1e-6
-"""Assumed: two events of a device within this time are one. An emulator whose next event is due at the moment at which
-it was just polled, by rounding or by mistake, is polled again this much later, so that time always advances."""
+"""Time within which two events of a device count as one [s] (assumed). An emulator whose next event is due at the
+time of its last poll, by rounding or by mistake, is polled again this much later, so that time always advances."""
 
 
 @dataclass(frozen=True)
 class LinkFault(Fault):
-    """Fault of the link itself, which every emulated device can have."""
+    """Fault of a link, possible for every emulated device."""
 
     known: ClassVar[Mapping[str, str]] = LINK_FAULTS
     delay_s: float = 0.05
-    """Five times the period of 100 Hz."""
+    """Delay of data by the fault [s]: five periods at 100 Hz."""
 
 
 def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[str, ...]]:
-    """Return the faults of the link, and the device's own as text.
+    """Return the faults of the link, parsed, and the faults of the device itself as text.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
 
 
 class Line:
-    """Emulated device and its end of the link.
+    """Emulated device with the device's end of its link.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ class Line:
     Attributes
     ----------
     deliver
-        Called with the second and the piece, in order of time, at the host's end; None: that is not open, and pieces
-        are dropped.
+        Function of the host's end, called with time [s] and piece in order of time; None: the host's end is not open,
+        and pieces are dropped.
     gone
-        Whether the link was unplugged by a fault.
+        True if a fault has unplugged the link.
     """
 
     def __init__(self, emulator: DeviceEmulator, faults: Sequence[LinkFault] = ()) -> None:
@@ -70,7 +70,7 @@ class Line:
         self._out: deque[tuple[float, Piece]] = deque()
 
     def feed(self, piece: Piece, now_s: float) -> None:
-        """Take a piece from the host at `now_s`, and deliver all pieces that are due."""
+        """Pass a piece from the host to the device at `now_s`, and deliver all pieces that are due."""
         self.poll(now_s)
         if self.gone:
             return
@@ -92,7 +92,7 @@ class Line:
         self._next_s = math.inf if self.gone else self._due_s(until_s)
 
     def next_s(self) -> float:
-        """Return the second of the next event; infinite: none before a piece comes."""
+        """Return the time of the next event [s]; infinite if there is no event until the host sends a piece."""
         if self._next_s is None:
             self._next_s = self._due_s(-math.inf)
         return self._next_s

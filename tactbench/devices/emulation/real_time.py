@@ -1,4 +1,4 @@
-"""Emulated devices on links of the system, in real time: pseudo-terminals, and UDP on loopback."""
+"""Emulated devices in real time, on links of the operating system: pseudo-terminals, and UDP on loopback."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from tactbench.links.datagram_link import LARGEST_DATAGRAM
 from tactbench.links.link import Clock
 
 STOP_S = 0.05
-"""Longest wait of a server without events, after which it checks whether it is to end."""
+"""Longest wait of a server without events [s], after which it checks for a request to end."""
 
 
 class PseudoTerminal:
-    """Serial line: its address is that of the terminal, which stays while hosts open and close it.
+    """Emulated serial line on a pseudo-terminal, whose address stays the same while hosts open and close it.
 
     Parameters
     ----------
     pattern
-        The address, with ``{}`` for the terminal.
+        Address of the link, with ``{}`` in place of the terminal's path.
     """
 
     def __init__(self, pattern: str) -> None:
@@ -68,7 +68,7 @@ class PseudoTerminal:
 
 
 class UdpEnd:
-    """UDP port on loopback; datagrams are sent to the sender of the last one."""
+    """UDP port on loopback; datagrams are sent to the sender of the datagram received last."""
 
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -101,14 +101,14 @@ class UdpEnd:
 
 
 End = PseudoTerminal | UdpEnd
-"""A link of the system at the emulated device's end; it never waits."""
+"""The emulated device's end of a link of the operating system; its calls never wait."""
 
 
 class SlcanAdapter:
-    """CAN device behind a serial adapter of python-can's interface ``slcan``: a line of text for each data frame.
+    """Emulated serial adapter (python-can's interface ``slcan``) of a CAN device: a line of text for each data frame.
 
-    Of the adapter's commands, ``O`` and ``L`` open it and ``C`` closes it; the others are ignored, and none is answered
-    [sourced: LAWICEL AB, CANUSB manual; python-can waits for no answer].
+    The adapter's commands ``O`` and ``L`` open it, ``C`` closes it; other commands are ignored, and no command is
+    answered [sourced: LAWICEL AB, CANUSB manual; python-can waits for no answer].
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class SlcanAdapter:
         self._open = False
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
-        """Take bytes from the host; return as :meth:`poll`."""
+        """Process bytes from the host; return the same as :meth:`poll`."""
         assert isinstance(piece, bytes)
         sent = list(self._device.poll(now_s))
         *lines, rest = (self._line + piece).split(b"\r")
@@ -141,11 +141,11 @@ class SlcanAdapter:
         return self._texts(sent)
 
     def poll(self, now_s: float) -> Sequence[Sent]:
-        """Return the frames on the bus by `now_s` as text; none while the adapter is closed."""
+        """Return the frames sent on the bus until `now_s` as text; no frames while the adapter is closed."""
         return self._texts(self._device.poll(now_s))
 
     def next_s(self) -> float:
-        """Return the second of the device's next event."""
+        """Return the time of the device's next event [s]."""
         return self._device.next_s()
 
     def _texts(self, sent: Sequence[Sent]) -> list[Sent]:
@@ -158,16 +158,16 @@ class SlcanAdapter:
 
 
 class RealTimeServer:
-    """Server that carries pieces between emulated devices and links of the system, by a clock.
+    """Server that transfers data between emulated devices and links of the operating system, at the times due.
 
-    Every piece has the time at which it is due, so that a wait that ends late delays it and no later one.
+    Every piece of data has its own due time, so that a wait that ends late delays this piece, but no later piece.
 
     Parameters
     ----------
     served
-        By device: its line, and its link of the system, which is closed with the server.
+        Line and link of the operating system by device name; the server closes the links.
     clock
-        Clock [ns] of the emulators' seconds.
+        Clock [ns] from which the emulators' time is computed.
     """
 
     def __init__(self, served: Mapping[str, tuple[Line, End]], clock: Clock) -> None:
@@ -181,10 +181,10 @@ class RealTimeServer:
         self._thread = threading.Thread(target=self._run, name="emulated devices", daemon=True)
         self._stop = False
         self.error: BaseException | None = None
-        """The error of an emulator, which ended the service."""
+        """Error of an emulator that ended the service; None: no error."""
 
     def start(self) -> None:
-        """Serve in a thread of its own, until :meth:`close`."""
+        """Serve in a separate thread, until :meth:`close`."""
         self._thread.start()
 
     def close(self) -> None:
@@ -197,7 +197,7 @@ class RealTimeServer:
         self._selector.close()
 
     def serve(self, at_s: float | None = None) -> float:
-        """Carry pieces received and due at `at_s`, or now; return the second of the next event, or infinity."""
+        """Transfer the data received and due at `at_s`, or now; return the time of the next event [s], or infinity."""
         for name, (line, end) in list(self._open.items()):
             pieces = end.received()
             now_s = self._clock() * 1e-9 if at_s is None else at_s  # not before the pieces were received

@@ -1,4 +1,4 @@
-"""The samples of one simulated scene, as emulated devices sense them."""
+"""Samples of one simulated scene, read by emulated devices as their sensed values."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 
 PRESSING_FORCE = "fz"
-"""Name under which a simulated rig gives the force with which the sensor is pressed, positive when pressing [N]."""
+"""Channel name of the force on the sensor in simulated rigs [N], positive when pressing."""
 
 
 class SceneSamples:
-    """A scene as :data:`~tactbench.devices.emulator.Senses`: every channel's latest sample at or before a time.
+    """A scene as :data:`~tactbench.devices.emulator.Senses`: each channel's latest sample up to a given time.
 
-    All channels are held from one sample to the next in the same way, so that the sensor's and the force sensor's stay
-    as simultaneous as they were simulated. Before and after the scene nothing is pressed: the samples of its first
+    Each channel holds its value until its next sample, so that the samples of sensor and force sensor stay as
+    simultaneous as they were simulated. Before and after the scene nothing is pressed: the samples of its first
     `rest_s` seconds, before pressing began, repeat, offsets and noise included. :meth:`start` begins the scene.
 
     Parameters
@@ -26,9 +26,9 @@ class SceneSamples:
     blocks
         Their blocks, with times in nanoseconds since the begin of the scene.
     duration_s
-        Length of the scene.
+        Length of the scene [s].
     rest_s
-        Length of its unloaded beginning; 0: the first sample alone is held.
+        Length of the scene's unloaded beginning [s]; 0: only the first sample is held.
     """
 
     def __init__(
@@ -48,11 +48,11 @@ class SceneSamples:
         self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
 
     def start(self, at_s: float) -> None:
-        """Let the scene begin at `at_s` on the devices' clock; it may begin again."""
+        """Let the scene begin at `at_s` on the devices' clock; a scene may be begun several times."""
         self._start_s = at_s
 
     def __call__(self, t_s: float) -> Mapping[str, float]:
-        """Return the value of every channel at `t_s`, seconds of the devices' clock, in the channels' units."""
+        """Return the value of every channel, in its unit, at the time `t_s` of the devices' clock [s]."""
         since_ns = round(1e9 * (t_s - (self._start_s or 0.0)))
         if self._start_s is None or not 0 <= since_ns < self._end_ns:
             since_ns = since_ns % self._rest_ns if self._rest_ns else 0

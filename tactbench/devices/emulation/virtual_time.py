@@ -1,4 +1,4 @@
-"""Virtual time: a clock that advances by waits alone, and the host's end of links to emulated devices."""
+"""Virtual time: a clock that advances only when a link waits, and the host's end of links to emulated devices."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class VirtualTime:
     Attributes
     ----------
     now_s
-        The time in seconds.
+        Present virtual time [s].
     lines
-        The devices; events of one moment happen in their order.
+        Lines of the devices; simultaneous events happen in the order of this list.
     """
 
     def __init__(self) -> None:
@@ -31,11 +31,11 @@ class VirtualTime:
         self.lines: list[Line] = []
 
     def __call__(self) -> int:
-        """Return the time in nanoseconds."""
+        """Return the virtual time [ns]."""
         return round(self.now_s * 1e9)
 
     def advance(self, until_ns: int) -> None:
-        """Advance all devices up to and including `until_ns`; a time that is over changes nothing."""
+        """Advance all devices up to and including `until_ns`; a past time changes nothing."""
         while self.step(until_ns * 1e-9):
             pass
 
@@ -45,7 +45,7 @@ class VirtualTime:
         Returns
         -------
         bool
-            Whether there was an event.
+            True if there was an event.
         """
         line = min(self.lines, key=Line.next_s, default=None)
         due_s = math.inf if line is None else line.next_s()
@@ -58,19 +58,19 @@ class VirtualTime:
 
 
 class _VirtualLink(Link):
-    """The host's end of a line: a piece reaches the device at once, and waits advance the time."""
+    """The host's end of an emulated link: data reach the device at once, and waits advance virtual time."""
 
     def __init__(self, name: str, time: VirtualTime, line: Line) -> None:
         super().__init__(f"emulated {name}", time)
         if line.deliver is not None:
-            raise LinkError(f"The link {self.address} is open already.", hint="Close the other one first.")
+            raise LinkError(f"The link {self.address} is open already.", hint="Close its first user.")
         self._time = time
         self._line = line
         self._arrived: deque[tuple[int, Piece]] = deque()
         line.deliver = self._arrive
 
     def timer(self) -> float:
-        """Return virtual seconds."""
+        """Return the virtual time [s]."""
         return self._time.now_s
 
     def _arrive(self, t_s: float, piece: Piece) -> None:
@@ -86,21 +86,21 @@ class _VirtualLink(Link):
         return replace(piece, t_ns=t_ns) if isinstance(piece, CanFrame) else Received(piece, t_ns)
 
     def send(self, piece: Any) -> None:
-        """Hand a piece to the device; raises LinkUnplugged."""
+        """Send data to the device; raises LinkUnplugged if a fault has unplugged the link."""
         self._sendable(piece)
         self._plugged()
         self._line.feed(piece, self._time.now_s)
 
     def _plugged(self) -> None:
         if self._line.gone:
-            raise self._unplugged(ConnectionError("unplugged, a fault of the emulated link"))
+            raise self._unplugged(ConnectionError("unplugged by a fault of the emulated link"))
 
     def _release(self) -> None:
         self._line.deliver = None
 
 
 class VirtualByteLink(_VirtualLink, ByteLink):
-    """A byte stream; a read returns one piece, with its time."""
+    """A byte stream in virtual time; a read returns the bytes of one piece, with its time of receipt."""
 
     def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         received: Received = self.receive(timeout_s)
@@ -111,8 +111,8 @@ class VirtualByteLink(_VirtualLink, ByteLink):
 
 
 class VirtualCanLink(_VirtualLink, CanLink):
-    """A CAN bus."""
+    """A CAN bus in virtual time."""
 
 
 class VirtualDatagramLink(_VirtualLink, DatagramLink):
-    """Datagrams."""
+    """A datagram link in virtual time."""

@@ -1,4 +1,4 @@
-"""The bench: real or emulated devices, pressed by hand."""
+"""The rig `bench`: real or emulated devices, pressed by hand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ TACTBENCH_API = 2
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
-    """Offer the rig."""
+    """Register the rig `bench` with the plugin manager."""
     return [
         RigDescriptor(
             name="bench", title="real devices, pressed by hand", where="tactbench.rigs.bench.rig:build",

@@ -1,7 +1,7 @@
-"""The bench as a rig: a sensor and a reference force sensor are read while a person presses, and nothing moves.
+"""The bench as a rig: sensor and reference force sensor are read while a person presses by hand; no motor moves.
 
-Devices that the rig file calls emulated sense what a simulated rig computes of the same scene, in virtual time; their
-links and drivers carry it as those of real ones do. What `tactbench emulate` runs in real time is a real device here.
+Devices marked as emulated in the rig file sense the forces that a simulated rig computes for the same scene, in virtual
+time, and use the usual drivers. Devices run by `tactbench emulate` in real time count as real devices here.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class BenchAcquisition:
-    """One scene at the bench: iterate it for blocks."""
+    """Recording of one scene at the bench: iterate over it to get the blocks."""
 
     streams: tuple[StreamSpec, ...]
     reference: tuple[StreamSpec, ...]
@@ -60,23 +60,23 @@ class BenchAcquisition:
     force: PressingForce | None
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield blocks until the scene is over, or a device is gone."""
+        """Yield blocks until the scene is over, or a device has failed."""
         for block in self.reading.blocks(self.duration_s):
             yield block if self.force is None else self.force.turned(block)
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """The counts of rows by stream."""
+        """Numbers of rows by stream: received, dropped and others."""
         return self.reading.stream_counts
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """The drivers' counts, by device and name."""
+        """Event counts of the drivers, by device and name."""
         return self.reading.counts
 
     @property
     def ended(self) -> str:
-        """The reason for which it ended before its time; empty: it did not."""
+        """Reason for an early end of the recording; empty: no early end."""
         return self.reading.ended
 
 
@@ -86,9 +86,9 @@ class Bench(Rig):
     Parameters
     ----------
     file
-        Which devices, on which links.
+        Rig file with the devices and their links.
     operator
-        The person who presses; not needed where all devices are emulated.
+        Access to the person who presses; not needed if all devices are emulated.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None) -> None:
@@ -99,14 +99,14 @@ class Bench(Rig):
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
-        """Open the devices and let them sample; the blocks begin when the scene does.
+        """Open the devices and let them sample; the blocks begin with the scene.
 
         Raises
         ------
         RigError
-            If a device is not what the rig file says, or no operator is there to press.
+            If a device is not as stated in the rig file, or there is no operator to press.
         UsageError
-            If the rig file has no entry for the sensor, or an option that a driver does not know.
+            If the rig file has no entry for the sensor, or has an option unknown to a driver.
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
@@ -131,7 +131,7 @@ class Bench(Rig):
             taken = ""
             if force is not None:
                 self._take_zero(force, file, drivers[FORCE], clock)
-                taken = f"Zero of the force: {force.zero[force.column]:.3g} N. "
+                taken = f"Force reading without load: {force.zero[force.column]:.3g} N. "
             profile, duration_s = scene.profile, scene.profile.duration.to("s")
             text = (
                 f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
@@ -163,7 +163,7 @@ class Bench(Rig):
         seconds = file.force.zero_s
         blocks: list[Block] = []
         if seconds > 0:
-            text = f"Take your hands off: nothing may touch the sensor while the force is zeroed, {seconds:g} s."
+            text = f"Take your hands off: nothing may touch the sensor for {seconds:g} s, while the force is zeroed."
             ask_operator(file, self._operator, "take the hands off", text)
             driver.start()
             until_ns = clock() + round(1e9 * seconds)
@@ -174,21 +174,21 @@ class Bench(Rig):
 
 
 def build(context: RigContext) -> Bench:
-    """Return the rig.
+    """Build the rig `bench`.
 
     Raises
     ------
     UsageError
-        If there is no rig file, or it names a simulation that is none, or devices that the bench does not open.
+        If there is no rig file, or its `physics` is not a simulation, or it has devices that the bench does not open.
     """
     if context.rig_file is None:
         raise UsageError(
-            "The rig 'bench' needs to know its devices.",
-            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft > FILE` makes one.",
+            "The rig 'bench' needs a rig file with its devices.",
+            hint="Give one by --rig-file FILE; `tactbench emulate biotac net-ft > FILE` makes one.",
         )
     if context.rig_file.devices:
         raise UsageError(
-            f"The bench opens no {', '.join(context.rig_file.devices)}: nothing moves on it.",
-            hint="Leave it out under `devices:`, or use the rig parallel-manipulator.",
+            f"The bench moves nothing, and so cannot open {', '.join(context.rig_file.devices)}.",
+            hint="Remove the entry under `devices:`, or use the rig parallel-manipulator.",
         )
     return Bench(context.rig_file, context.operator)

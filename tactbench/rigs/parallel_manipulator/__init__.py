@@ -1,7 +1,7 @@
 """The rig with a linear motor on a parallel manipulator and a force-torque sensor, and their drivers and emulators.
 
-Nothing here has met a real device: each codec is tested against public descriptions, each driver against the emulator
-beside it.
+No part of it was tested on a real device: each codec is tested against public descriptions, each driver against its
+emulator.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ TACTBENCH_API = 2
 
 @hookimpl
 def tactbench_devices() -> list[DeviceDescriptor]:
-    """Offer the devices."""
+    """Register the devices with the plugin manager."""
     here = __name__
     return [
         DeviceDescriptor(
@@ -40,7 +40,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
-    """Offer the rig."""
+    """Register the rig with the plugin manager."""
     here = __name__
     return [
         RigDescriptor(

@@ -1,10 +1,10 @@
-"""The rig's emulated devices: a motor presses the sensor of a simulated scene, force sensor and sensor respond.
+"""The rig's emulated devices: a motor presses a simulated sensor; force sensor and sensor respond to its position.
 
 Quasi-static. The motor's position gives the depth of the indenter, the simulated rig's press curve the force at that
-depth, and the sensor has its reading of the simulated recording of the same scene at the moment at which the ramp had
-that force. So effects of force are exact on a slow ramp, and effects of time (drift, creep, noise) are those of the
-simulated recording as long as the force keeps to its profile. Left out: the machine's own compliance, the mass between
-motor and force sensor, the effect of a quicker press on a skin with memory, all sideways motion.
+depth, and the sensor's reading is that of the simulated recording of the same scene at the time when the ramp had
+this force. So effects of force are exact on a slow ramp, and effects of time (drift, creep, noise) are those of the
+simulated recording as long as the force keeps to its profile. Not modelled: the machine's compliance, the mass between
+motor and force sensor, the effect of a quicker press on a skin with memory, and sideways motion.
 """
 
 from __future__ import annotations
@@ -24,54 +24,52 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatedDevice
 
 FORCE = "fz"
-"""Name of the pressing force in a simulated rig and in emulated force sensors."""
+"""Channel name of the pressing force in a simulated rig and in emulated force sensors."""
 FLOOR_N = 0.6e-3
-"""Standard deviation of the force sensor's own noise (derived: quantisation of a Nano17 read with 16 bits on +-10 V,
+"""Standard deviation of the force sensor's noise [N] (derived: quantisation of a Nano17 read with 16 bits on +-10 V,
 rms of Fz); without it a sensor without noise would seem stuck."""
 BEYOND_M = 1.0
-"""Length of the spring behind the end of the press curve, at least the travel of any motor."""
+"""Length of the linear spring beyond the press curve's end [m]: at least the travel of any motor."""
 _FLOOR_DRAWS = 1 << 14
 _FLOOR_HZ = 7000
-"""A new draw for each sample of a Net F/T box."""
+"""Rate of new noise values [Hz]: one for each sample of a Net F/T box."""
 
 
 def quiet(scene: Scene) -> Scene:
-    """Return the scene for the simulated rig: the load follows the profile, the force is not filtered.
+    """Return the scene to simulate: the load follows the force profile exactly, without a filter of the force.
 
     Raises
     ------
     NotApplicable
-        If it slides, or nothing is pressed, or the load does not begin at 0: there is no moment for every force.
+        If the scene slides, presses nothing or does not begin at 0 N: its recording then lacks some of the forces.
     """
     profile = scene.profile
     if scene.slide is not None:
         raise NotApplicable(f"The scene {scene.name!r} slides, and this rig only presses.")
     rises = profile.kind == "ramp" and profile.corners[1][0] == 0 < profile.corners[1][-1]
     if not rises or not profile.duration.to("s") > profile.hold_s:
-        raise NotApplicable(
-            f"The scene {scene.name!r} is no rise of the force from 0 N, and this rig presses no other."
-        )
+        raise NotApplicable(f"The scene {scene.name!r} is not a ramp from 0 N, the only profile that this rig presses.")
     environment = scene.environment.model_copy(update={"force_filter": None})
     return scene.model_copy(update={"drive": None, "environment": environment})
 
 
 class EmulatedPress:
-    """A simulated scene under an emulated motor.
+    """A simulated sensor, pressed by an emulated motor.
 
-    Without load the sensor reads the unloaded hold of the recording, by the time since :meth:`start`, again and again.
+    Without load, the sensor repeats the readings of the recording's unloaded hold, from :meth:`start` on.
 
     Parameters
     ----------
     simulated
-        The scene of :func:`quiet` as the simulated rig has carried it out.
+        The scene of :func:`quiet` as carried out by the simulated rig.
     scene
-        The same scene.
+        The scene of :func:`quiet` itself.
     skin_m
-        Position of the motor, as its drive counts, at which the indenter touches [m].
+        Position of the motor at which the indenter touches the skin, as its drive counts [m].
     largest_n
-        The largest force of interest; beyond it the skin is a spring as stiff as there.
+        Largest force that is simulated [N]; beyond it the skin is a spring with the stiffness at this force.
     rng
-        Draws the force sensor's own noise.
+        Random generator for the force sensor's noise.
     """
 
     def __init__(
@@ -95,7 +93,7 @@ class EmulatedPress:
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
 
     def start(self, at_s: float) -> None:
-        """Let the scene's time begin, on the devices' clock."""
+        """Let the scene's time begin at `at_s` of the devices' clock [s]."""
         self._start_s = at_s
 
     def force_n(self, position_m: float) -> float:
@@ -103,7 +101,7 @@ class EmulatedPress:
         return float(np.interp(position_m, *self._curve)) if position_m > self.skin_m else 0.0
 
     def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
-        """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
+        """Return every channel's value, in its unit, at a time of the devices' clock [s] and a motor's position [m]."""
         force_n = self.force_n(position_m)
         last_s = self._duration_s - 1e-9  # the sample at the end of the scene is one without load
         since_s = min((t_s - self._start_s) % self._duration_s, last_s)
@@ -118,21 +116,21 @@ class EmulatedPress:
 
 
 class PressEmulators(RigEmulators):
-    """Emulators of a rig file's devices, those of all its sensors: the motor moves, the others sense its press.
+    """Emulators of a rig file's devices, with all its sensors: the motor moves, sensor and force sensor respond.
 
     Raises
     ------
     UsageError
-        If the file lacks something.
+        If the rig file lacks a device or a setting.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
         self._file = file
         limited, self._settings = with_limits(file, registry)
         self.press: EmulatedPress | None = None
-        """The present scene; None: nothing is pressed."""
+        """Press of the present scene; None: no sensor is pressed."""
         self.pushed_n = 0.0
-        """Force of a push by hand on the force sensor, beside that of the skin."""
+        """Force of a push by hand on the force sensor [N], added to that of the skin."""
         self._motor: Any = None
         devices: dict[str, EmulatedDevice] = {}
         for sensor in file.sensors:
@@ -147,7 +145,7 @@ class PressEmulators(RigEmulators):
                 self._motor = axis
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
-        """Put the sensor of a scene before the motor; the height of its skin is drawn."""
+        """Put the sensor of a scene below the motor; the height of its skin is drawn at random."""
         press: Any = simulated  # a SimulatedPress
         settings, heights, scene = self._settings, self._settings.heights, quiet(scene)
         rng = np.random.default_rng([self._file.emulation.seed, seed, *b"skin", *scene.name.encode()])
@@ -158,7 +156,7 @@ class PressEmulators(RigEmulators):
         self.press = EmulatedPress(press, scene, skin_m=skin_m, largest_n=largest_n, rng=rng)
 
     def begin(self, at_s: float) -> None:
-        """Let the scene's time begin."""
+        """Let the scene's time begin, see :meth:`EmulatedPress.start`."""
         if self.press is not None:
             self.press.start(at_s)
 

@@ -1,4 +1,4 @@
-"""A linear delta: its geometry as data, joint values of places and back, nearness to singularities, permitted moves.
+"""A linear delta robot: geometry, inverse and forward kinematics, distance from singularities, permitted moves.
 
 Leg i stands at azimuth phi_i, with e = (cos phi, sin phi, 0), t = (-sin phi, cos phi, 0), z up. Parallelograms keep the
 platform parallel to its base, so the platform's radius is subtracted from the base's and each leg is one link of length
@@ -48,19 +48,19 @@ if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
 
 ROUNDING = 1e-12
-"""Part of a link's length by which it may miss: distances of metres carry errors of a few 1e-16 of themselves, and
-geometry files a few more; three digits are left over."""
+"""Permitted closure error as part of a link's length: distances of metres have errors of a few 1e-16 of themselves,
+geometry files a few more; three digits are spare."""
 SAMPLE_M = 0.2e-3
-"""Distance of samples along a move."""
+"""Distance of the tested samples along a move [m]."""
 WAY_POINT_M = 1e-3
-"""Largest distance of way points: at each all rails come to rest, between them each runs by itself (assumed)."""
+"""Largest distance of way points [m]; all rails stop at each way point, and run independently in between (assumed)."""
 LEAST = 0.15
-"""Of s, sigma_U and sigma_W (assumed: joint speeds and errors grow to at most 7 times)."""
+"""Least permitted s, sigma_U and sigma_W (assumed: joint speeds and errors grow at most 7 times)."""
 MODE = -1
-"""Sign of det(p - c1, p - c2, p - c3) of a machine whose carriages are ahead; kept along every permitted move."""
+"""Sign of det(p - c1, p - c2, p - c3) with carriages ahead of the platform; constant along every permitted move."""
 Length = Annotated[float, Field(gt=0, le=1e5)]
 Place = tuple[float, float, float]
-"""x, y, z of the manipulator's point [m]."""
+"""Coordinates x, y, z of the manipulator's point [m]."""
 
 
 def _for_each_leg(value: Any) -> Any:
@@ -68,38 +68,38 @@ def _for_each_leg(value: Any) -> Any:
 
 
 PerLeg = Annotated[tuple[float, float, float], BeforeValidator(_for_each_leg)]
-"""Three numbers, or one for all legs."""
+"""Three numbers, one for each leg; or one number for all legs."""
 PositivePerLeg = Annotated[tuple[Length, Length, Length], BeforeValidator(_for_each_leg)]
 
 
 class ClosureError(RigError):
-    """Joint values at which the three links do not meet, or that fix no place."""
+    """The three links do not meet at the given joint values, or the joint values determine no place."""
 
 
 class PlaceRefusedError(RigError):
-    """A place or a move is not permitted; nothing has moved."""
+    """A place or a move of the manipulator is not permitted; nothing has moved."""
 
 
 class LinearDelta(Options):
-    """Three carriages on straight rails, vertical or inclined; q is the carriage's way along its rail from A [m]."""
+    """Three carriages on straight rails, vertical or inclined; q is a carriage's position along its rail from A [m]."""
 
     kind: Literal["linear-delta"] = "linear-delta"
     title: str
-    """Shown with the results of its kinematics; the shipped one is called an example."""
+    """Name of the machine, shown with results of its kinematics; the shipped machine is called an example."""
     source: Source
     """Origin of these numbers: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
     azimuth_deg: PerLeg = (0.0, 120.0, 240.0)
-    """Direction of each leg about z."""
+    """Azimuth of each leg about z [deg]."""
     base_radius_mm: PositivePerLeg
-    """From the axis to each joint's zero."""
+    """Distance from the axis to the zero of each joint [mm]."""
     platform_radius_mm: PositivePerLeg
-    """From the platform's axis to the joint of each link."""
+    """Distance from the platform's axis to the joint of each link [mm]."""
     link_mm: PositivePerLeg
-    """Length of each link between its joints."""
+    """Length of each link between its joints [mm]."""
     inclination_deg: PerLeg = (90.0, 90.0, 90.0)
-    """Angle of each rail above the horizontal, outwards; 90: vertical."""
+    """Angle of each rail above the horizontal, outwards [deg]; 90: vertical."""
     joint_lowest_mm: PerLeg
-    """Least permitted position of each carriage."""
+    """Least and greatest permitted position of each carriage [mm]."""
     joint_highest_mm: PerLeg
     sideways_deg: Annotated[float, Field(gt=0, lt=90)] = 30.0
     """Largest angle of a link out of its leg's plane (assumed: rod ends of ordinary size)."""
@@ -108,36 +108,36 @@ class LinearDelta(Options):
     def _sound(self) -> Self:
         apart = np.abs(np.diff([*self.azimuth_deg, self.azimuth_deg[0] + 360.0]) % 360.0)
         if apart.min() < 1.0 or apart.max() > 359.0:
-            raise ValueError("two legs stand at the same azimuth")
+            raise ValueError("two legs have the same azimuth_deg; give different angles")
         if (self.joint_range[0] >= self.joint_range[1]).any():
-            raise ValueError("a joint's lowest value is not below its highest")
+            raise ValueError("joint_lowest_mm must be below joint_highest_mm")
         return self
 
     @cached_property
     def radial(self) -> FloatArray:
-        """The (3, 3) unit vectors e, a row per leg."""
+        """Radial unit vectors e, (3, 3): one row for each leg."""
         phi = np.radians(self.azimuth_deg)
         return np.stack([np.cos(phi), np.sin(phi), np.zeros(3)], axis=1)
 
     @cached_property
     def sideways(self) -> FloatArray:
-        """The (3, 3) unit vectors t, a row per leg."""
+        """Sideways unit vectors t, (3, 3): one row for each leg."""
         return np.stack([-self.radial[:, 1], self.radial[:, 0], np.zeros(3)], axis=1)
 
     @cached_property
     def anchor_m(self) -> FloatArray:
-        """The (3, 3) folded zeros A [m], a row per leg."""
+        """Zeros A of the joints, less the platform's radius [m], (3, 3): one row for each leg."""
         folded = np.subtract(self.base_radius_mm, self.platform_radius_mm)
         return np.asarray(1e-3 * folded[:, None] * self.radial)
 
     @cached_property
     def link_m(self) -> FloatArray:
-        """The (3,) lengths of the links [m]."""
+        """Lengths of the links [m], (3,)."""
         return 1e-3 * np.asarray(self.link_mm)
 
     @cached_property
     def rail(self) -> FloatArray:
-        """The (3, 3) unit vectors d along the rails, a row per leg."""
+        """Unit vectors d along the rails, (3, 3): one row for each leg."""
         alpha = np.radians(self.inclination_deg)
         # Of a right angle, cos is to be 0 and not 6e-17: vertical rails are parallel.
         along = np.where(np.abs(np.asarray(self.inclination_deg)) == 90.0, 0.0, np.cos(alpha))
@@ -145,11 +145,11 @@ class LinearDelta(Options):
 
     @cached_property
     def joint_range(self) -> FloatArray:
-        """The (2, 3) least and greatest permitted joint values [m]."""
+        """Least and greatest permitted joint values [m], (2, 3)."""
         return 1e-3 * np.array([self.joint_lowest_mm, self.joint_highest_mm])
 
     def centre_m(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 3 legs, 3) joint centres [m] of (..., 3) joint values."""
+        """Return the (..., 3 legs, 3) joint centres [m] for (..., 3) joint values [m]."""
         return self.anchor_m + q[..., None] * self.rail
 
 
@@ -168,9 +168,9 @@ def _root(product: FloatArray) -> FloatArray:
 
 
 def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (..., 3) joint values [m] of places (..., 3) [m], and the length by which each link is too short [m].
+    """Return (..., 3) joint values [m] for places (..., 3) [m], and the length by which each link is too short [m].
 
-    Where a leg does not reach, its joint value is that of the stretched leg; never a NaN.
+    If a leg does not reach the place, its joint value is that of the stretched leg; never NaN.
     """
     w = _finite(p_m)[..., None, :] - delta.anchor_m
     along = _dot(w, delta.rail)
@@ -180,7 +180,7 @@ def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, Floa
 
 
 def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
-    """Return the (..., 3) places [m] of joint values (..., 3) [m].
+    """Return the (..., 3) places [m] at joint values (..., 3) [m].
 
     Raises
     ------
@@ -196,7 +196,7 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     n = np.cross(a, b)
     aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
     if (nn <= 1e-24 * np.maximum(aa, bb) ** 2).any():
-        raise ClosureError(f"The joint centres of {delta.title} lie in one line: its joints fix no place.")
+        raise ClosureError(f"The joint centres of {delta.title} lie in one line: the joint values determine no place.")
     along_a, along_b = 0.5 * (aa + (L[0] - L[1]) * (L[0] + L[1])), 0.5 * (bb + (L[0] - L[2]) * (L[0] + L[2]))
     to_a, to_b = np.cross(b, n) / nn[..., None], np.cross(n, a) / nn[..., None]
     x = along_a[..., None] * to_a + along_b[..., None] * to_b
@@ -207,7 +207,7 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     if (far - L[0] > ROUNDING * L[0]).any():
         raise ClosureError(
             f"The links of {delta.title} do not meet at these joint values: {1e3 * float((far - L[0]).max()):.3g} mm "
-            "are missing.",
+            "are missing to the links' lengths.",
             hint="A step was lost or the geometry is wrong: home again, then check the geometry.",
         )
     height = MODE * _root((L[0] - far) * (L[0] + far))
@@ -215,18 +215,18 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
 
 
 class Measures(NamedTuple):
-    """Nearness to singularities at places (..., 3)."""
+    """Distance from singularities at places (..., 3); see the module's table."""
 
     serial: FloatArray
-    """(..., 3 legs) abs(u_i.d_i)."""
+    """Measure s of each leg, abs(u_i.d_i), (..., 3)."""
     parallel: FloatArray
-    """(...) sigma_U."""
+    """Measure sigma_U, (...)."""
     constraint: FloatArray
-    """(...) sigma_W."""
+    """Measure sigma_W, (...)."""
     sideways_rad: FloatArray
-    """(..., 3 legs) asin abs(u_i.t_i)."""
+    """Angle of each link out of its leg's plane, asin abs(u_i.t_i) [rad], (..., 3)."""
     det: FloatArray
-    """(...) det U; its sign is the assembly mode."""
+    """Determinant of U, (...); its sign is the assembly mode."""
 
 
 def links(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> FloatArray:
@@ -235,7 +235,7 @@ def links(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
-    """Return the measures at places (..., 3) [m] with their joint values (..., 3)."""
+    """Return the distances from singularities at places (..., 3) [m] with joint values (..., 3) [m]."""
     unit = links(delta, p_m, q)
     across = np.cross(delta.sideways, unit)
     return Measures(
@@ -251,7 +251,7 @@ def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
 
 
 def margins(delta: LinearDelta, p_m: FloatArray) -> dict[str, FloatArray]:
-    """Return by limit the distance to it at (n, 3) places [m], an (n,) each: m, rad or 1; below 0: it is not kept."""
+    """Return, by name of the limit, (n,) distances from it at (n, 3) places [m], in m, rad or 1; below 0: exceeded."""
     q, shortfall = solve_inverse(delta, p_m)
     found = measures(delta, p_m, q)
     low, high = delta.joint_range
@@ -273,7 +273,7 @@ def margins(delta: LinearDelta, p_m: FloatArray) -> dict[str, FloatArray]:
 def check_move(delta: LinearDelta, start_m: FloatArray, end_m: FloatArray) -> None:
     """Raise PlaceRefusedError unless the straight move between places (3,) [m] is permitted.
 
-    Its beginning is not checked: the platform stands there already.
+    The beginning of the move is not checked: the platform is there already.
     """
     count = max(1, math.ceil(float(np.linalg.norm(end_m - start_m)) / SAMPLE_M))
     places = start_m + np.arange(1, count + 1)[:, None] / count * (end_m - start_m)
@@ -281,20 +281,20 @@ def check_move(delta: LinearDelta, start_m: FloatArray, end_m: FloatArray) -> No
         if (left < 0).any():
             place = ", ".join(f"{1e3 * x:.2f}" for x in places[np.argmax(left < 0)])
             raise PlaceRefusedError(
-                f"({place}) mm is not permitted: the {name} is beyond its limit.",
-                hint="Nothing was moved. Choose another place or another way.",
+                f"({place}) mm is not permitted: {name} beyond its limit.",
+                hint="Nothing has moved. Choose another place or another path.",
             )
 
 
 def way(
     delta: LinearDelta, here_m: Place, xy_m: tuple[float, float], clearance_m: float, stand_off_m: float
 ) -> list[Place]:
-    """Return the places of a way: up to the clearance, sideways there, down to the stand-off above `xy_m`.
+    """Return the places [m] of a path: up to the clearance, sideways, then down to the stand-off above `xy_m`.
 
     Raises
     ------
     PlaceRefusedError
-        If one is not permitted; nothing has moved.
+        If a move of the path is not permitted; nothing has moved.
     """
     top_m = max(here_m[2], clearance_m)
     places: list[Place] = [here_m, (*here_m[:2], top_m), (*xy_m, top_m), (*xy_m, stand_off_m)]
@@ -304,7 +304,7 @@ def way(
 
 
 def way_points(delta: LinearDelta, places: list[Place]) -> Iterator[list[float]]:
-    """Yield the joint values [m] of the way points of a permitted way."""
+    """Yield the joint values [m] at the way points of a permitted path."""
     for start, end in pairwise(np.array(place) for place in places):
         pieces = math.ceil(float(np.linalg.norm(end - start)) / WAY_POINT_M)
         for n in range(1, pieces + 1):

@@ -1,4 +1,4 @@
-"""The rig: a linear motor on a parallel manipulator presses a sensor under force control, while both are read."""
+"""The rig: a linear motor on a parallel manipulator presses a sensor under force control, while devices are read."""
 
 from __future__ import annotations
 
@@ -54,28 +54,28 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, ScenePhysics
 
 STOP_S = 10.0
-"""Added to the time of a retreat (assumed: a control period, and the answer of a guard in another process)."""
+"""Time added to that of a retreat [s] (assumed: a control period, and the answer of a guard in another process)."""
 
 
 @dataclass
 class PressAcquisition:
-    """One scene under the rig: iterate it for blocks."""
+    """Recording of one scene with the rig: iterate over it to get the blocks."""
 
     streams: tuple[StreamSpec, ...]
     reference: tuple[StreamSpec, ...]
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     about: Mapping[str, Scalar]
-    """What is known of the scene at its beginning."""
+    """Facts about the scene known at its beginning."""
     force: PressingForce = field(repr=False)
     control: Control = field(repr=False)
     reading: Reading = field(repr=False)
     blocks: Iterator[Block] = field(repr=False)
-    """The sensor's, from before the scene on."""
+    """Blocks of the sensor, beginning before the scene."""
     clock: Clock = field(repr=False)
     duration_s: float
     retreat_s: float
-    """Longest time of a retreat."""
+    """Longest time of a retreat [s]."""
     events: list[Event] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -84,7 +84,7 @@ class PressAcquisition:
         self._rows: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield blocks of sensor, force sensor and motor until the scene is over; then unload, and retreat."""
+        """Yield blocks of sensor, force sensor and motor until the scene is over; then unload it and retreat."""
         end_ns = self.begin_ns + round(1e9 * self.duration_s)
         for block in self.blocks:
             yield from self._within(chain((block,), self.control.blocks()), end_ns)
@@ -102,9 +102,9 @@ class PressAcquisition:
                 yield self.force.turned(block.rows(slice(first, last)))
 
     def stop(self, why: str) -> str:
-        """Let the motor retreat at once, and wait for it; return the instruction for the operator if it is not out.
+        """Let the motor retreat at once, and wait for it; return an instruction for the operator if the retreat failed.
 
-        A further interrupt changes nothing: the retreat goes on.
+        A further interrupt does not stop the retreat.
         """
         waiting = True
         while waiting:
@@ -116,7 +116,7 @@ class PressAcquisition:
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """The values drawn and achieved: place, touch, events."""
+        """Facts about the scene, including those known at its end: place, touch, events."""
         press = self.control.press
         events = {
             f"event {number}": f"{1e-9 * (event.t_ns - self.begin_ns):.3f} s, {event.state}: {event.text}"
@@ -133,7 +133,7 @@ class PressAcquisition:
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """The counts of the scene's rows by stream of the sensor; rows before and after it are not counted."""
+        """Numbers of the scene's rows by stream of the sensor; rows before and after the scene are not counted."""
         found = {}
         for name, one in self.reading.stream_counts.items():
             rows = self._rows.get(name, 0)
@@ -143,39 +143,39 @@ class PressAcquisition:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """The counts of drivers and guard."""
+        """Event counts of drivers and guard, by device and name."""
         guard = {f"{name}: {what}": n for name, counts in self.control.counts.items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property
     def ended(self) -> str:
-        """The reason for which it ended before its time; empty: it did not."""
+        """Reason for an early end of the scene; empty: no early end."""
         press, late = self.control.press, self.control.late
         reason = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
         return "; ".join(filter(None, (reason, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):
-    """Devices of a rig file, and the control that presses with them.
+    """Devices of a rig file, and the control which presses a sensor with them.
 
-    Guard and homes outlive a scene: by the clock the session that keeps them begins with the first scene and ends with
-    this object or an error. In virtual time each scene has its own, so that a recording does not depend on those before
-    it.
+    Guard and homes are kept between scenes: in real time the session with them begins with the first scene and ends
+    with this object or an error. In virtual time each scene has its own session, so that a recording does not depend on
+    earlier scenes.
 
     Parameters
     ----------
     file
-        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those that `tactbench
-        emulate` runs in real time are real ones here.
+        Rig file with devices, links and settings. Emulated devices are in virtual time; devices run by `tactbench
+        emulate` in real time count as real here.
     operator
-        The person who mounts the caps; not needed where all devices are emulated.
+        Access to the person who mounts the caps; not needed if all devices are emulated.
     physics
-        The simulation of the scenes that move emulated devices; None: there is none.
+        Simulation of the scenes for emulated devices; None: no device is emulated.
 
     Raises
     ------
     UsageError
-        If the settings lack something, or contradict each other. :func:`build` refuses what `doctor` refuses.
+        If the settings lack a value or contradict each other. :func:`build` refuses the same files as `doctor`.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
@@ -186,23 +186,23 @@ class ParallelManipulator(Rig):
         self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
 
     def close(self) -> None:
-        """End the session, if there is one: disarm the guard and close all devices."""
+        """End the session, if one is open: disarm the guard and close all devices."""
         if self._session is not None:
             self._session = None
             self._finish()
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
-        """Go to the scene's place, open the sensor, find the surface, and wait just above it.
+        """Move to the scene's place, open the sensor, find its surface, and wait just above it.
 
         Raises
         ------
         NotApplicable
-            If the scene asks for more than a rise of the force from 0, or for a place out of the declared reach.
+            If the scene is not a ramp of the force from 0, or its place is outside the declared reach.
         RigError
-            If a device is not what the rig file says, no operator is there to mount a cap, or the surface is not found.
+            If a device is not as stated in the rig file, there is no operator to mount a cap, or no surface is found.
         UsageError
-            If the rig file has no entry for the sensor, or an option that a driver does not know.
+            If the rig file has no entry for the sensor, or has an option unknown to a driver.
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
@@ -232,9 +232,9 @@ class ParallelManipulator(Rig):
         for name, value, (low, high) in (("x", x_mm, places.reach_x_mm), ("s", s_mm, places.reach_s_mm)):
             if not low <= value <= high:
                 raise NotApplicable(
-                    f"The scene {scene.name!r} asks for {name} = {value:g} mm; the rig file's reach is {low:g} to "
+                    f"The scene {scene.name!r} has {name} = {value:g} mm; the rig file's reach is {low:g} to "
                     f"{high:g} mm.",
-                    hint="Widen `settings: places:`, or put the sensor elsewhere.",
+                    hint="Widen `settings: places:`, or move the sensor.",
                 )
         return places.place_m(x_mm, s_mm)
 
@@ -247,7 +247,7 @@ class ParallelManipulator(Rig):
         simulated: Acquisition | None,
         xy_m: tuple[float, float],
     ) -> PressAcquisition:
-        """Return the scene, ready to begin; `stack` closes what is its own."""
+        """Return the scene's recording, ready to begin; `stack` closes the scene's own devices."""
         settings, guard, clock, profile = self.settings, session.guard, session.clock, scene.profile
         emulators, facts, placement = session.emulators, self._facts, scene.placement
         ask = partial(ask_operator, with_sensor(self._file, sensor.name), self._operator)
@@ -255,7 +255,7 @@ class ParallelManipulator(Rig):
         duration_s = profile.duration.to("s")
         ask(
             "mount a cap",
-            f"{scene.name}: {sensor.spec.title}. Mount the {scene.indenter}, take your hands out, and say so. Then it "
+            f"{scene.name}: {sensor.spec.title}. Mount the {scene.indenter}, take your hands out, and confirm. Then it "
             f"is pressed to {profile.largest_n:g} N within {duration_s:.0f} s; Ctrl-C retreats.",
         )
         (driver,) = session.opened(sensor.name, sensor.name)
@@ -334,7 +334,7 @@ def _course(scene: Scene) -> Course:
 
 
 def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
-    """Let the press find the surface, dropping all rows; return the events."""
+    """Let the press find the surface, dropping all rows received meanwhile; return the guard's events."""
     press = control.press
     for _ in blocks:
         for _ in control.blocks():
@@ -346,13 +346,13 @@ def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
         reasons = [press.ended or "the sensor has ended", *(one.text for one in events if one.trigger is not None)]
         raise RigError(
             f"The surface was not found: {'; '.join(reasons)}.",
-            hint="Look at the rig: sensor, cap, heights in the rig file.",
+            hint="Check sensor, cap, and the heights in the rig file.",
         )
     return events
 
 
 def _disarm(session: Session) -> None:
-    """Let the guard expect no more beats; a guard that is lost has reported it, and has retreated."""
+    """Disarm the guard; the loss of the guard's process is ignored, since it was reported with its retreat before."""
     with suppress(GuardLostError):
         session.guard.disarm()
     if session.emulators is not None:
@@ -360,22 +360,22 @@ def _disarm(session: Session) -> None:
 
 
 def build(context: RigContext) -> ParallelManipulator:
-    """Return the rig.
+    """Build the rig `parallel-manipulator`.
 
     Raises
     ------
     UsageError
-        If there is no rig file, it lacks something, `doctor` refuses it, or it names a simulation that is none.
+        If there is no rig file, or it is incomplete or refused by `doctor`, or its `physics` is not a simulation.
     """
     if context.rig_file is None:
         raise UsageError(
-            "The rig 'parallel-manipulator' needs to know its devices and its limits.",
-            hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
+            "The rig 'parallel-manipulator' needs a rig file with its devices and limits.",
+            hint="Give one by --rig-file FILE; `tactbench doctor --rig-file FILE` shows its forces.",
         )
     file = context.rig_file
     if problems := check(file).problems:
         raise UsageError(
             f"The rig file is refused: {problems[0]}",
-            hint="`tactbench doctor --rig-file FILE --seconds 0` says all that it would do.",
+            hint="`tactbench doctor --rig-file FILE --seconds 0` lists all problems.",
         )
     return ParallelManipulator(file, context.operator, physics_of(file, load_registry()))

@@ -1,4 +1,4 @@
-"""The forces that a rig file permits this rig, and the reasons to refuse it; nothing is opened and nothing moves."""
+"""Check of a rig file: largest forces that it permits, and reasons to refuse it; no device is opened or moved."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from tactbench.rigs.parallel_manipulator.settings import (
 )
 
 LOOK_S = 7e-3
-"""A look of the guard, and the delay of its scheduling: the part of a reaction beside the age of the force and the
-axis' own latency."""
+"""Time of one check by the guard, with scheduling delay [s]: part of a reaction, besides the age of the force and the
+axis' latency."""
 INCREMENT_BYTES = 65
-"""Bytes of one increment and the polls that confirm its end, and their answers: LA-12345, OK, M, OK, TPOS, -12345, POS,
--12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
+"""Number of bytes on the line for an increment, the polls that confirm its end, and their answers: LA-12345, OK, M, OK,
+TPOS, -12345, POS, -12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
 MOST_OF_LIMIT = 0.5
-"""Largest permitted part of the largest stable gain: overshoot, and a skin stiffer than declared, need the rest."""
+"""Largest permitted part of the largest stable gain: the rest is for overshoot and skins stiffer than declared."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m", "orientation")
 _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_unit_a")
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return the forces of axes and loop, and the problems for which the file is refused.
+    """Return tables of the largest forces of axes and force loop, and the problems for which the file is refused.
 
     Raises
     ------
     UsageError, UnknownNameError
-        If the file lacks something, or names what is not installed.
+        If the file lacks a value, or a device in it is not installed.
     """
     registry = load_registry()
     file, settings = with_limits(file, registry)
@@ -52,7 +52,7 @@ def check(file: RigFile) -> RigCheck:
     axes: list[tuple[str, ...]] = []
 
     def refusing(do: Callable[[], object]) -> None:
-        """Keep an error of `do` as a problem."""
+        """Call `do`; add an error that it raises to the problems."""
         try:
             do()
         except TactbenchError as error:
@@ -79,7 +79,7 @@ def check(file: RigFile) -> RigCheck:
     used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
     if used > MOST_OF_LIMIT:
         problems.append(
-            f"The force loop's gains are {used:.2f} of those that no longer settle at the greatest stiffness; at most "
+            f"The force loop's gains are {used:.2f} of the largest stable gains at the greatest stiffness; at most "
             f"{MOST_OF_LIMIT:g} is permitted. Divide both gains by {used / MOST_OF_LIMIT:.2f} or more."
         )
     share = ("share of the largest stable gains", f"{used:.2f}, at most {MOST_OF_LIMIT:g}")
@@ -111,10 +111,10 @@ def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
 
 
 def _together_n(delta: LinearDelta, settings: RigSettings, most_n: Sequence[float]) -> float:
-    """Return the largest norm of the force that the rails exert on the platform within the reach [N]; NaN: not known.
+    """Return the largest norm of the rails' joint force on the platform within the reach [N]; NaN: not known.
 
-    F = U^T S^-1 f for forces f along the rails (derived: their power is the platform's, U p' = S q'). It is linear in
-    f, so the largest is at the ends of all f.
+    F = U^T S^-1 f for forces f along the rails (derived: their power is the platform's, U p' = S q'). F is linear
+    in f, so the largest norm is at extreme values of all f.
     """
     heights = (settings.heights.stand_off_m, settings.heights.clearance_m)
     places_m = np.array([(*corner, height) for corner in settings.places.corners_m() for height in heights])
@@ -132,8 +132,8 @@ def _too_strong(what: str, force_n: float, settings: RigSettings) -> list[str]:
     if force_n <= rated_n:
         return []
     return [
-        f"{what} can exert {force_n:.1f} N, and the weakest part bears {rated_n:g} N: where the force sensor reads "
-        "wrong, that is the last bound. Lower the peak current."
+        f"{what} can exert {force_n:.1f} N, and the weakest part bears {rated_n:g} N: if the force sensor reads "
+        "wrong values, only the drive limits the force. Lower the peak current."
     ]
 
 
@@ -145,10 +145,10 @@ def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     if force_n is None:
         missing.append("peak_force_n (or peak current and force constant)")
     elif isinstance(options, FaulhaberOptions) and options.current_limit_a is None:
-        missing.append("force_constant_n_a, without which the drive is sent no limit for the declared force")
+        missing.append("force_constant_n_a, without which no limit for the declared force is sent to the drive")
     problems = [] if force_n is None else _too_strong(f"The {name}'s drive", force_n, settings)
     if missing:
-        problems.append(f"The options of {name} lack {', '.join(missing)}; nothing moves without.")
+        problems.append(f"The options of {name} lack {', '.join(missing)}; state them in the rig file.")
     skin, away = (1, "negative") if name == MOTOR else (-1, "positive")
     if options.homes_towards() == skin:
         problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s {away}.")
@@ -161,7 +161,7 @@ def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
 
 
 def _axis_row(options: Any) -> tuple[str, ...]:
-    """Return an axis' orientation, its largest force with the source, and the units that the file does not state."""
+    """Return an axis' orientation, its largest force with the source, and the units missing in the rig file."""
     force_n = options.largest_force_n
     without = "holds without power" if options.holds_unpowered else "FALLS without power: it stays powered"
     assumed = [name for name in _UNITS if name in type(options).model_fields and name not in options.model_fields_set]
@@ -174,23 +174,23 @@ def _axis_row(options: Any) -> tuple[str, ...]:
 
 
 def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str]:
-    """Return the problem if an increment takes longer on the line than the loop is computed with."""
+    """Return a problem if an increment takes longer on the line than assumed for the force loop."""
     loop, exchange_ms = settings.force_loop, 1e3 * line_time_s(INCREMENT_BYTES, options.baud)
     allowed_ms = 1e3 / loop.rate_hz + loop.delay_ms
     if exchange_ms <= allowed_ms:
         return []
     return [
         f"One increment takes {exchange_ms:.1f} ms on the line; control period and declared delay are "
-        f"{allowed_ms:g} ms together. Lower rate_hz, state the delay, or raise baud."
+        f"{allowed_ms:g} ms together. Lower rate_hz, raise delay_ms, or raise baud."
     ]
 
 
 def _forces(
     settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float
 ) -> tuple[list[tuple[str, str]], list[str]]:
-    """Return the largest forces by situation, and a problem for each above the rated or allowed one.
+    """Return the largest force in each situation, and a problem for each force above its limit.
 
-    A reaction is as late as the rig file allows: the force has the largest age that the guard accepts.
+    A reaction is assumed as late as the rig file permits: at the largest age of the force that the guard accepts.
     """
     limits, touch, stiffness, motor = settings.limits, settings.touch, settings.stiffness, facts[MOTOR]
     age_s = 1e-3 * limits.force_age_ms
@@ -218,24 +218,24 @@ def _forces(
     rows = [
         (
             "reaction",
-            f"{1e3 * react_s:.1f} ms, of which {1e3 * age_s:.1f} that the force may be old and "
-            f"{1e3 * motor.stop_latency_s:.1f} of the motor and its line",
+            f"{1e3 * react_s:.1f} ms, of which {1e3 * age_s:.1f} ms age of the force and "
+            f"{1e3 * motor.stop_latency_s:.1f} ms of motor and line",
         ),
         ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
-        ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
+        ("in an approach with an undetected touch", f"{by_approach:.2f} N: ceiling and reaction"),
         (
-            "where the force sensor ceases to answer",
-            f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
+            "if the force sensor stops responding",
+            f"{min(by_approach + k * way_m, drive_n):.2f} N, at most the drive's; detected after {1e3 * way_m:.2f} mm",
         ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
-        *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),
+        *([("of a rail that moves down onto an object", f"{max(rails):.2f} N")] if rails else ()),
     ]
     problems = []
     largest = max(by_step, by_approach, *rails)
     if not largest <= limits.rated_force_n:  # also refuses what is not a number
         problems.append(
             f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower "
-            "the speed, the ceiling, force_age_ms or the approach's threshold, or quicken the line."
+            "the speed, the ceiling, force_age_ms or the approach's threshold, or speed the line up."
         )
     if not first <= touch.allowed_n:
         problems.append(

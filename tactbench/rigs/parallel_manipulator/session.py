@@ -1,4 +1,4 @@
-"""The parts of the rig that outlive a scene: the guard with all axes, homed once, and emulated devices."""
+"""The parts of the rig that are kept between scenes: the guard with all axes, homed once, and emulated devices."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, Link
 
 CHECK_S = 1.0
-"""Time over which the force of a push by hand is averaged."""
+"""Time over which the force of a push by hand is averaged [s]."""
 CHECK_FACTOR = 1.5
-"""Largest factor between the push and its reading: a hand is no better; a wrong unit is further off (assumed)."""
+"""Largest ratio of a push and its reading: a hand is not more exact; a wrong unit gives a larger ratio (assumed)."""
 NEAR_M = 0.2e-3
-"""Largest distance of the measured place from its target (assumed: three rails, each within a drive's corridor)."""
+"""Largest distance of the measured place from its target [m] (assumed: three rails, each within a drive's corridor)."""
 
 
 class Session:
-    """Opens all devices but the sensor's, and keeps them until :meth:`close`.
+    """Session that opens all devices but the sensor, and keeps them open until :meth:`close`.
 
     Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time,
     all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their home as
@@ -54,19 +54,19 @@ class Session:
     Parameters
     ----------
     file
-        The rig file; each of its sensors that is emulated has its emulator here.
+        The rig file; all its emulated sensors get emulators in this session.
     registry
-        Of the devices.
+        Registry of the installed devices.
 
     Attributes
     ----------
     checked
-        The result of the check of the force chain; empty: not yet made.
+        Result of the check of the force sensor by a push; empty: not yet checked.
 
     Raises
     ------
     LinkError, RigError, UsageError
-        If a link cannot be opened, or a device does not answer or is another.
+        If a link cannot be opened, or a device does not answer or is not as stated.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
@@ -91,11 +91,11 @@ class Session:
             opening.pop_all()
 
     def close(self) -> None:
-        """Disarm the guard and close all devices; axes hold where they are."""
+        """Disarm the guard and close all devices; axes hold their positions."""
         self._stack.close()
 
     def opened(self, sensor: str, *names: str) -> list[Any]:
-        """Open drivers of devices by name, with one of the sensors; the caller closes them."""
+        """Open and return drivers of devices by name, with `sensor` as the rig's sensor; the caller closes them."""
         drivers = drivers_of(self._file, self._registry, sensor, self._links, self.clock, names)
         return [drivers[name] for name in names]
 
@@ -116,9 +116,9 @@ class Session:
     # The beginning of a scene -----------------------------------------------------------------------------------------
 
     def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, Limits]:
-        """Take the force sensor's zero, nothing being armed; return it, and the limits of the guard.
+        """Take the force sensor's zero while the guard is not armed; return the force sensor, and limits for the guard.
 
-        `confirmed`: whether an operator has seen that the indenter is clear of the sensor.
+        `confirmed` is true if an operator has confirmed that the indenter is clear of the sensor.
         """
         assert self._file.force is not None
         settings, stream = self.settings, self.guard.force_stream
@@ -145,7 +145,7 @@ class Session:
         return force, kept
 
     def _fresh(self, seconds: float) -> list[Block]:
-        """Return the force samples that are received in the next seconds, without earlier ones."""
+        """Return the force samples received in the next `seconds`, without earlier samples."""
         since_ns = self.clock()
         self.guard.advance(since_ns + round(1e9 * seconds))
         found = [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks if block.t_ns is not None]
@@ -155,31 +155,31 @@ class Session:
     def travel(
         self, xy_m: tuple[float, float], ask: Callable[[str, str], bool] = lambda doing, text: False
     ) -> Place | None:
-        """Home all axes without a home, and move the platform above a place; return it as measured, None: it is fixed.
+        """Home all axes that are not homed, move the platform above a place; return the place measured, None if fixed.
 
-        Before, an operator confirms that the indenter is clear of the sensor where that is not known, and the force
-        chain is checked once. The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops
+        Before, an operator confirms that the indenter is clear of the sensor if this is not known, and the force sensor
+        is checked once. The guard is armed meanwhile: it monitors the force, with the ceiling of travel, and can stop
         all rails.
 
         Parameters
         ----------
         xy_m
-            The place.
+            Target of the platform, x and y [m].
         ask
-            See :func:`ask_operator`.
+            Function that prompts an operator, see :func:`ask_operator`.
 
         Raises
         ------
         RigError
-            If the force of a push is not read, the way is not permitted, the guard has stopped it, or the platform is
-            not where it was sent.
+            If the force of a push is read wrong, the path is not permitted, the guard has stopped the move, or the
+            platform is not at its target.
         """
         guard, delta, heights = self.guard, self.settings.manipulator, self.settings.heights
         if unclear := guard.disarm().unclear:  # of the scene before, if that ended in a fault
             ask(
-                "see that the indenter is clear of the sensor",
+                "check that the indenter is clear of the sensor",
                 f"The indenter is not known to be clear of the sensor: {unclear}. Bring it to its place of retreat by "
-                "hand or by the controller's own means, see that it touches nothing, and say so.",
+                "hand or by the controller's own means, check that it touches nothing, and confirm.",
             )
         _, limits = self.measured_limits(confirmed=bool(unclear))
         self.checked = self.checked or self._check_force(limits, ask)
@@ -195,25 +195,25 @@ class Session:
                 report = guard.beat(Beat(now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets))
                 if report.state is not GuardState.ARMED or (report.reason and not report.early):
                     reason = report.trigger or report.reason
-                    raise RigError(f"The manipulator was stopped on its way: {reason}.", hint="See what is in its way.")
+                    raise RigError(f"The manipulator was stopped on its way: {reason}.", hint="Check what blocks it.")
                 targets = targets if report.early else {}
                 guard.advance(now_ns + round(1e9 / self.settings.force_loop.rate_hz))
         place = _place_m(delta, guard.disarm().positions)
         off_m = math.dist(place, places[-1])
         if not off_m <= NEAR_M:
             raise RigError(
-                f"The platform is {1e3 * off_m:.3f} mm from where it was sent.",
-                hint=f"Home {', '.join(JOINTS)}; check the geometry.",
+                f"The platform is {1e3 * off_m:.3f} mm away from its target.",
+                hint=f"Home {', '.join(JOINTS)}; then check the geometry.",
             )
         return place
 
     def _check_force(self, limits: Limits, ask: Callable[[str, str], bool]) -> str:
-        """Let an operator push the force sensor, and return the reading; raises RigError if it is another force."""
+        """Let an operator push the force sensor, and return the reading as text; raises RigError if it is wrong."""
         push_n = self.settings.press.check_n
         if push_n is None:
             return "NOT CHECKED: the rig file has `check_n: null`"
         what = f"Push the force sensor as a press would, with about {push_n:g} N ({1e3 * push_n / 9.80665:.0f} g)"
-        asked = ask("push the force sensor", f"{what}; hold it for {1 + CHECK_S:g} s, and say so now.")
+        asked = ask("push the force sensor", f"{what}; hold it for {1 + CHECK_S:g} s, and confirm now.")
         if not asked and self.emulators is None:
             return "NOT CHECKED: the devices are emulated"
         if self.emulators is not None:
@@ -225,13 +225,13 @@ class Session:
         least_n, most_n = push_n / CHECK_FACTOR, push_n * CHECK_FACTOR
         if not least_n <= read_n <= most_n:
             raise RigError(
-                f"The force sensor reads {read_n:+.3g} N of a push of about {push_n:g} N: {least_n:.2g} to {most_n:.2g}"
+                f"The force sensor reads {read_n:+.3g} N in a push of about {push_n:g} N: {least_n:.2g} to {most_n:.2g}"
                 " N are expected. Nothing has moved.",
-                hint="Correct `sign:` under `force:` where it falls; else unit, counts or calibration (kgf read 0.10, "
+                hint="Correct `sign:` under `force:` if negative; else unit, counts or calibration (kgf read 0.10, "
                 "lbf 0.22 of the newtons).",
             )
-        ask("take the hand off", "Take hand or weight off the force sensor again, and say so.")
-        return f"{read_n:.3g} N read of a push of about {push_n:g} N"
+        ask("take the hand off", "Take hand or weight off the force sensor again, and confirm.")
+        return f"{read_n:.3g} N read in a push of about {push_n:g} N"
 
 
 def _place_m(delta: LinearDelta, positions: Mapping[str, float]) -> Place:

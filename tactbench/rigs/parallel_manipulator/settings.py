@@ -1,6 +1,6 @@
-"""The `settings:` of this rig in a rig file, checked: nothing is moved by a file that lacks a limit.
+"""Models of this rig's `settings:` in a rig file; a file without all limits is refused, so that nothing moves.
 
-Plain numbers, each with its unit in its name, which become SI here. Positions of the motor are positive into the skin.
+Plain numbers, with the unit in a setting's name, converted to SI here. Motor positions are positive into the skin.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from tactbench.plugin.devices import (
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 
 MOTOR = "motor"
-"""Name of the pressing axis' entry under `devices:`."""
+"""Name of the entry for the pressing axis under `devices:`."""
 JOINTS = ("joint-1", "joint-2", "joint-3")
-"""Names of the entries of the manipulator's rails, in the order of its legs."""
+"""Names of the entries for the manipulator's rails under `devices:`, in the order of its legs."""
 BEATS = 3
-"""Control periods without a beat after which the guard retreats, at least (derived: rig practice of two to three)."""
+"""Least number of control periods without a beat before the guard retreats (derived: rig practice is two to three)."""
 LEAST_HEARTBEAT_S = 0.02
-"""Shorter limits trip falsely: sleeps on an ordinary kernel are late by up to 9.4 ms (measured)."""
+"""Least time limit for a beat [s]; shorter limits trip falsely, as sleeps end up to 9.4 ms late (measured)."""
 WINDUP_S = 0.2
-"""Times the loop's speed: the distance by which its target may be ahead of the measured position (assumed)."""
+"""Time [s] whose product with the loop's speed is the largest lead of target over measured position (assumed)."""
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -41,30 +41,30 @@ Range = tuple[float, float]
 
 
 def _rising(names: str, *numbers: float) -> None:
-    """Raise ValueError unless no number is below the one before."""
+    """Raise ValueError if a number is below the number before it."""
     if list(numbers) != sorted(numbers):
-        raise ValueError(f"{names} do not rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
+        raise ValueError(f"{names} must rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
 
 
 class SafetyLimits(Options):
-    """Limits that are never exceeded."""
+    """Limits of force, time and travel that are enforced by the guard."""
 
     force_ceiling_n: Positive
-    """Norm of the raw force, in one sample, at which the motor retreats while it presses."""
+    """Norm of the raw force in one sample at which the motor retreats while it presses."""
     travel_ceiling_n: Positive = 0.2
-    """The same while the manipulator moves, and while any axis is homed or retracted: above noise and drift, well below
-    a press (assumed)."""
+    """Norm of the raw force for a retreat while the manipulator moves, or any axis is homed or retracted: above noise
+    and drift, well below a press (assumed)."""
     torque_ceiling_nm: Positive | None = None
-    """Norm of the raw torque; None: torque is not limited."""
+    """Norm of the raw torque at which the motor retreats; None: torque is not limited."""
     rated_force_n: Positive
-    """Load that the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
+    """Largest load of the weakest part (skin, sensor, force sensor or cap) by its data sheet."""
     force_age_ms: Positive = 30.0
-    """Largest age of a sample of the force: three sampling periods of the force sensor, and the delays of sender and
+    """Largest age of a force sample: three sampling periods of the force sensor, and the delays of sender and
     host (assumed: 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
-    """Least and greatest position of the motor; between them lies the 0 of a Faulhaber drive."""
+    """Least and greatest position of the motor; the 0 of a Faulhaber drive must lie in between."""
     heartbeat_ms: Positive
-    """Time without a beat of the rig after which the motor retreats."""
+    """Time without a beat (sign of life) of the rig after which the motor retreats."""
     retreat_mm: float
     """Position of the motor away from the skin, where it waits and to which it retreats."""
     retreat_speed_mm_s: Positive
@@ -72,9 +72,9 @@ class SafetyLimits(Options):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         low, high = self.travel_mm
-        _rising("the motor's travel and its place of retreat", low, self.retreat_mm, high)
+        _rising("least travel_mm, retreat_mm and greatest travel_mm", low, self.retreat_mm, high)
         ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
-        _rising("ceiling of travel, ceiling of pressing and rated force", *ceilings)
+        _rising("travel_ceiling_n, force_ceiling_n and rated_force_n", *ceilings)
         return self
 
 
@@ -82,39 +82,39 @@ class Stiffness(Options):
     """Stiffness of skin, cap and machine in series, N/mm; declared, since it cannot be computed beforehand."""
 
     softest_n_mm: Positive
-    """The least of any skin and cap, from the first touch on: force per way from any place to any deeper one. The lower
-    it is, the later a force sensor that does not respond is noticed; above a skin's own, its presses are ended."""
+    """Least stiffness of any skin and cap, from the first touch on: force per way between any two depths. The lower
+    it is, the later a force sensor that does not respond is noticed; above a skin's own, presses on it are ended."""
     at_touch_n_mm: Positive
-    """The greatest up to the force that a first touch may have."""
+    """Greatest stiffness up to the largest permitted force of a first touch."""
     greatest_n_mm: Positive
-    """At the largest commanded force on the stiffest cap, where the loop must settle."""
+    """Stiffness at the largest commanded force on the stiffest cap, where the force loop must be stable."""
     at_ceiling_n_mm: Positive
-    """At the ceiling, where a late reaction adds force."""
+    """Stiffness at the force ceiling, where a late reaction adds force."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         stiffnesses = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
-        _rising("stiffness of the softest skin, at a touch, greatest, at the ceiling", *stiffnesses)
+        _rising("softest_n_mm, at_touch_n_mm, greatest_n_mm and at_ceiling_n_mm", *stiffnesses)
         return self
 
 
 class ForceControl(Options):
-    """The force loop."""
+    """Settings of the force loop."""
 
     rate_hz: Positive
-    """Control periods a second, each with a beat for the guard."""
+    """Control periods per second, each with a beat to the guard."""
     proportional_mm_n: NotNegative = 0.0
     integral_mm_n_s: Positive
     cutoff_hz: Positive | None
-    """Of the first-order low-pass on the regulated force; null: unfiltered."""
+    """Cut-off frequency of the first-order low-pass on the regulated force; null: unfiltered."""
     delay_ms: NotNegative
-    """From a force sample to the drive's receipt of the command: line time, answers, a control period's phase."""
+    """Delay from a force sample to the drive's receipt of the command: line time, answers, a control period's phase."""
     motor_lag_ms: NotNegative
-    """Time constant of the drive's position loop."""
+    """Lag of the motor: time constant of the drive's position loop."""
     speed_mm_s: Positive
-    """Largest speed of the loop: 2 to 5 times that of the ramp at the softest place."""
+    """Largest speed commanded by the loop: 2 to 5 times that of the ramp on the softest skin."""
     feed_forward_n_mm: Positive | None = None
-    """Assumed stiffness for the ramp's feed-forward; null: none."""
+    """Assumed stiffness for the ramp's feed-forward; null: no feed-forward."""
 
     @property
     def step_m(self) -> float:
@@ -122,7 +122,7 @@ class ForceControl(Options):
         return 1e-3 * self.speed_mm_s / self.rate_hz
 
     def law(self, travel_mm: Range) -> ForceLaw:
-        """Return the law within a travel of the motor."""
+        """Return the control law within a travel of the motor [mm]."""
         return ForceLaw(
             period_s=1 / self.rate_hz,
             proportional=1e-3 * self.proportional_mm_n,
@@ -135,70 +135,70 @@ class ForceControl(Options):
         )
 
     def model(self, travel_mm: Range) -> LoopModel:
-        """Return the loop on a linear skin."""
+        """Return the model of the force loop, with the motor's travel [mm]."""
         return LoopModel.around(self.law(travel_mm), lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
 
 class Touch(Options):
-    """The search for the surface; see :class:`PressPlan`."""
+    """Settings of the search for the surface; see :class:`PressPlan`."""
 
     speed_mm_s: Positive
-    """On the way to the expected surface, out of its reach."""
+    """Speed on the way to the expected surface, before it can be reached."""
     touch_speed_mm_s: Positive
-    """From there on."""
+    """Speed from there until the touch."""
     acceleration_mm_s2: Positive
-    """Of starting and braking."""
+    """Acceleration of starting and braking."""
     single_n: Positive
-    """A touch: two of three raw samples above it. Well above the force sensor's noise."""
+    """Force of a touch: two of three raw samples above it. It must be well above the force sensor's noise."""
     mean_n: Positive
-    """A touch as well: the mean of the raw samples of the last `mean_ms` above it. Also the largest mean without touch:
-    before the surface, after lifting off, and at the place of retreat."""
+    """Mean force of a touch: the mean of raw samples in the last `mean_ms` above it. Also the largest mean without
+    contact: before the surface, after lifting off, and at the place of retreat."""
     mean_ms: Positive
-    """One control period or more; the noise of a mean falls with its square root."""
+    """Time of this mean: one control period or more; its noise falls with the square root of the time."""
     allowed_n: Positive
-    """The largest force of a first touch that is acceptable."""
+    """Largest acceptable force of a first touch."""
     contact_n: Positive
-    """Force that is kept after the touch, until the place of the surface is known; and the least on the ramp."""
+    """Force held after the touch until the position of the surface is known; also the least force on the ramp."""
     settle_s: Positive
-    """Time for which it is kept."""
+    """Time for which `contact_n` is held."""
     lift_mm: Positive
-    """Distance of the motor from that place during the unloaded hold."""
+    """Distance of the motor from the place of contact during the unloaded hold."""
 
 
 class PressRules(Options):
-    """The end of a press, also before its time; see :class:`PressPlan`."""
+    """Settings of the normal or early end of a press; see :class:`PressPlan`."""
 
     error_band_n: Positive
-    """Largest distance of the filtered force from the setpoint; above it for a second, the motor retreats."""
+    """Largest difference of filtered force and setpoint; if exceeded for a second, the motor retreats."""
     unload_speed_mm_s: Positive
-    """After the scene's ramp."""
+    """Speed of unloading after the scene's ramp."""
     check_n: Positive | None = 3.0
     """Push by hand, or weight, with which an operator loads the force sensor before the first press of a session: it
-    must be read with its sign, and within a factor of 1.5. null: not checked, as recordings state."""
+    must be read with the right sign, within a factor of 1.5. null: not checked, as noted in recordings."""
     stale_ms: Positive = 100.0
-    """Largest time without a row of the sensor; after it, the motor retreats."""
+    """Longest time without a row of the sensor; after this time the motor retreats."""
 
 
 class Heights(Options):
     """Expected height of the sensor's surface below the indenter.
 
-    Heights are those of the manipulator's point at which the tip of the retracted indenter would have that height.
+    Heights are those of the manipulator's point for which the retracted indenter's tip is at the stated height.
     """
 
     surface_mm: float
-    """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
+    """Height of the manipulator at which the retracted indenter would touch; 0 for a fixed manipulator."""
     tolerance_mm: NotNegative
-    """Largest distance of the surface from there: three times its spread, and the differences of the caps' lengths."""
+    """Largest distance of the surface from `surface_mm`: three times its spread, and differences of caps' lengths."""
     stand_off_mm: Positive
-    """Between tip and expected surface before the motor approaches."""
+    """Distance of tip and expected surface before the motor approaches."""
     clearance_mm: Positive
-    """Between tip and expected surface on sideways moves."""
+    """Distance of tip and expected surface on sideways moves."""
     depth_mm: Positive
     """Greatest depth of the motor below the expected surface."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        _rising("tolerance, stand-off and clearance", self.tolerance_mm, self.stand_off_mm, self.clearance_mm)
+        _rising("tolerance_mm, stand_off_mm and clearance_mm", self.tolerance_mm, self.stand_off_mm, self.clearance_mm)
         return self
 
     @property
@@ -213,17 +213,17 @@ class Heights(Options):
 
 
 class Places(Options):
-    """The manipulator's place for a scene: the sensor's nominal contact point and the scene's offset from it."""
+    """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets."""
 
     x_mm: float = 0.0
-    """Manipulator's x with the indenter above the nominal contact point."""
+    """Manipulator's x (next: y) with the indenter above the nominal contact point."""
     y_mm: float = 0.0
     turned_deg: float = 0.0
-    """Direction of the sensor's x in the manipulator's plane; its s is 90 deg further."""
+    """Direction of the sensor's x in the manipulator's plane; the sensor's s is 90 deg further."""
     reach_x_mm: Range = (0.0, 0.0)
-    """Offsets that scenes may ask for along the sensor; all of the rectangle is tested beforehand."""
+    """Permitted offsets of scenes along the sensor; the whole rectangle is tested beforehand."""
     reach_s_mm: Range = (0.0, 0.0)
-    """Offsets along its arc; laid out flat."""
+    """Permitted offsets along the sensor's arc, as if it were flat."""
 
     def place_m(self, x_mm: float, s_mm: float) -> tuple[float, float]:
         """Return the manipulator's x and y [m] for offsets on the sensor."""
@@ -233,13 +233,13 @@ class Places(Options):
         return 1e-3 * x, 1e-3 * y
 
     def corners_m(self) -> list[tuple[float, float]]:
-        """Return the four corners of the reach, in turn [m]."""
+        """Return the manipulator's x and y [m] at the four corners of the reach, in turn."""
         (x0, x1), (s0, s1) = self.reach_x_mm, self.reach_s_mm
         return [self.place_m(*at) for at in ((x0, s0), (x1, s0), (x1, s1), (x0, s1))]
 
 
 class RigSettings(Options):
-    """All settings of this rig beside its devices."""
+    """All settings of this rig, besides its devices."""
 
     limits: SafetyLimits
     manipulator: Literal["fixed"] | LinearDelta
@@ -251,7 +251,7 @@ class RigSettings(Options):
     touch: Touch
     press: PressRules
     guard_log: str = "tactbench-guard.log"
-    """File to which the guard's process appends a line for each event, also when the rig's own process is lost."""
+    """File to which the guard's process appends one line for each event, even if the rig's own process has ended."""
 
     @model_validator(mode="after")
     def _together(self) -> Self:
@@ -260,21 +260,21 @@ class RigSettings(Options):
         deepest_mm = limits.retreat_mm + heights.stand_off_mm + heights.depth_mm
         found_mm = 1e3 * (self.found_m - self.surface_m)
         for names, *numbers in (
-            ("three control periods (20 ms at least) and the heartbeat", least_ms, limits.heartbeat_ms),
-            ("a control period and the time of a touch's mean", 1e3 / loop.rate_hz, touch.mean_ms),
-            ("the force kept after a touch and that of a touch", touch.contact_n, touch.mean_n),
-            ("a touch in a single sample and the ceiling", touch.single_n, limits.force_ceiling_n),
-            ("the speed of the touch and of the way to it", touch.touch_speed_mm_s, touch.speed_mm_s),
-            ("lift and stand-off", touch.lift_mm, heights.stand_off_mm),
-            ("retreat, stand-off and depth together, and the motor's travel", deepest_mm, limits.travel_mm[1]),
-            ("where the softest skin is touched (mean_n/softest_n_mm) and the depth", found_mm, heights.depth_mm),
+            ("three control periods (20 ms at least) and heartbeat_ms", least_ms, limits.heartbeat_ms),
+            ("a control period and mean_ms", 1e3 / loop.rate_hz, touch.mean_ms),
+            ("contact_n and mean_n", touch.contact_n, touch.mean_n),
+            ("single_n and force_ceiling_n", touch.single_n, limits.force_ceiling_n),
+            ("touch_speed_mm_s and speed_mm_s", touch.touch_speed_mm_s, touch.speed_mm_s),
+            ("lift_mm and stand_off_mm", touch.lift_mm, heights.stand_off_mm),
+            ("retreat_mm + stand_off_mm + depth_mm, and the greatest travel_mm", deepest_mm, limits.travel_mm[1]),
+            ("depth of the touch on the softest skin (mean_n/softest_n_mm) and depth_mm", found_mm, heights.depth_mm),
         ):
             _rising(names, *numbers)
         return self
 
     @property
     def speeds_mm_s(self) -> tuple[float, ...]:
-        """All speeds of the motor."""
+        """All speeds of the motor in the settings."""
         touch = self.touch
         return (touch.speed_mm_s, touch.touch_speed_mm_s, self.press.unload_speed_mm_s, self.limits.retreat_speed_mm_s)
 
@@ -290,17 +290,17 @@ class RigSettings(Options):
 
     @property
     def touch_way_m(self) -> float:
-        """Way into the softest skin until its mean force is a touch [m]."""
+        """Way into the softest skin until its mean force counts as touch [m]."""
         return 1e-3 * self.touch.mean_n / self.stiffness.softest_n_mm
 
     @property
     def found_m(self) -> float:
-        """Position of the motor at which the surface must have been touched [m]: a mean lags by its time."""
+        """Position of the motor at which even the lowest, softest skin must have been touched [m]: a mean lags."""
         behind_m = 1e-6 * self.touch.touch_speed_mm_s * self.touch.mean_ms
         return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m + behind_m
 
     def press_plan(self, resolution_m: float, force: StreamSpec) -> PressPlan:
-        """Return the numbers of a press by an axis with a least step [m], and with the stream of a force sensor."""
+        """Return the numbers of a press for an axis' smallest step [m] and the stream of a force sensor."""
         touch, press = self.touch, self.press
         return PressPlan(
             law=self.force_loop.law((self.limits.travel_mm[0], 1e3 * self.deepest_m)),
@@ -323,13 +323,13 @@ class RigSettings(Options):
 
 
 class ManipulatorFile(RigFile):
-    """A rig file of this rig: errors in its settings name their line."""
+    """Rig file of this rig; messages on errors in its settings give the line."""
 
     settings: RigSettings  # type: ignore[assignment]
 
 
 def settings_of(file: RigFile) -> RigSettings:
-    """Return the settings of a rig file; raises UsageError if one is wrong, or a device is missing."""
+    """Return the settings of a rig file; raises UsageError if a setting is wrong, or a device is missing."""
     found = read_options(RigSettings, file.settings, "the rig file's settings")
     missing = [name for name in axes_of(found) if name not in file.devices]
     if missing or file.force is None:
@@ -341,28 +341,28 @@ def settings_of(file: RigFile) -> RigSettings:
 
 
 def axes_of(settings: RigSettings) -> tuple[str, ...]:
-    """Return the names of the axes, the pressing one first: it is homed and retracted before the others move."""
+    """Return the names of the axes, the pressing axis first, as it is homed and retracted before the others move."""
     return (MOTOR,) if settings.manipulator == "fixed" else (MOTOR, *JOINTS)
 
 
 def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Positioner], dict[str, Any]]:
-    """Return the class of an axis, and its options; raises UsageError if it is none."""
+    """Return the class of an axis' driver, and its options; raises UsageError if it is not a Positioner."""
     descriptor = registry.devices[entry.device]
     kind: Any = load_object(descriptor.driver)
     if not (isinstance(kind, type) and issubclass(kind, Positioner)):
         raise UsageError(
-            f"The {name}, {entry.device}, is no Positioner.", hint="Its DeviceDescriptor's driver names the class."
+            f"The {name}, {entry.device}, is no axis.", hint="Its DeviceDescriptor's driver must be a Positioner."
         )
     return kind, {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
 
 
 def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
-    """Return the file with the settings' limits among the motor's options, and its settings.
+    """Return the rig file with the limits of its settings added to the motor's options, and the settings.
 
     Raises
     ------
     UsageError
-        As :func:`settings_of`, and if the motor's options state a limit of their own.
+        As in :func:`settings_of`, and if the motor's options state a limit a second time.
     """
     settings, entry = settings_of(file), file.devices[MOTOR]
     limits = settings.limits
@@ -379,7 +379,7 @@ def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
         own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
     if twice := [name for name in own if name in entry.options]:
         raise UsageError(
-            f"The motor's {', '.join(twice)} is stated among its options.",
+            f"The motor's {', '.join(twice)} is stated in its options.",
             hint="State it once, under `settings: limits:` and `touch:`.",
         )
     read_options(kind.options_kind, {**options, **own}, entry.device)

@@ -7,7 +7,7 @@ from tests.core.matrix.plugin_packages import write_metadata
 
 CHECKED = {
     "{force_ceiling: 5}": (2, r"rig\.yaml:4.*force_ceiling_n"),
-    "{force_ceiling_n: 5}": (0, "5 N.*Nothing was opened"),
+    "{force_ceiling_n: 5}": (0, "5 N.*No device was opened"),
     "{force_ceiling_n: 12}": (1, "refused: The frame bears 10 N.*12 N"),
 }
 

@@ -61,7 +61,7 @@ def test_steps_go_where_they_are_typed_and_the_force_is_shown():
 
 def test_it_halts_at_the_ceiling_and_goes_back():
     heard, largest_n, motor = steps("yes", "1", "+", "-0.6", "")
-    said = [text for text in heard if "ceiling" in text and ("was halted" in text or "further that way" in text)]
+    said = [text for text in heard if "ceiling" in text and ("was halted" in text or "no further" in text)]
     assert len(said) >= 2  # of the step, and of the next one
     # 1 mm/s for a look, the force's age and the drive's latency: some 20 ms, of 2 N/mm.
     assert CEILING_N < largest_n < CEILING_N + N_M * 1e-3 * 0.05

@@ -168,7 +168,7 @@ def test_a_device_that_falls_silent_ends_the_scene_and_the_recording_is_incomple
     assert press(tmp_path / "p.h5", file) is None
     meta, streams = read(tmp_path / "p.h5")
     assert meta.excluded.startswith("incomplete")
-    assert f" {stream} for 0.3" in meta.excluded
+    assert f" {stream} came for 0.3" in meta.excluded
     assert len(streams["taxels"].data) < 40 * SECONDS  # the scene ended
     with pytest.raises(DataError, match=f"1 recordings.*{stream}"):
         load_dataset(TASK, [tmp_path / "p.h5"])

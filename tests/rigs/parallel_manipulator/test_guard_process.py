@@ -121,7 +121,7 @@ def test_an_error_of_a_driver_while_homing_lets_the_motor_stand(tmp_path, monkey
     monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_STOP)
     # At 5 mm/s on 2 N/mm, 3 N are 0.3 s after the driver's error: what a busy machine may take.
     with rig("process", tmp_path, FAULTS.Setting(stiffness_n_m=2e3), force_driver=RAISING) as made:
-        with pytest.raises(GuardRefusesError, match="motor stands"):
+        with pytest.raises(GuardRefusesError, match="motor is at rest"):
             made.guard.arm(made.setting.limits)
         assert stands(made)
         assert 0.1 < made.world.force_n < 3.0

@@ -115,7 +115,7 @@ def test_a_rail_is_homed_away_from_the_skin(speed_m_s):
 def test_the_way_until_a_dead_force_is_noticed_is_of_the_softest_skin():
     def way_mm(softest_n_mm):
         (_, forces) = check(file_of(settings__stiffness__softest_n_mm=softest_n_mm)).tables
-        (row,) = [value for what, value in forces.rows if "ceases" in what]
+        (row,) = [value for what, value in forces.rows if "stops responding" in what]
         return float(row.split()[-2])
 
     # Twice the tolerance of 0.4 mm, the way to a mean of 0.1 N, and 0.5 mm/s for the 20 ms of a mean.

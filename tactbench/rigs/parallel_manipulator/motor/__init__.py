@@ -1,1 +1,1 @@
-"""The linear motor on an RS232 line: a Faulhaber drive of the 300x RS generation, spoken to in ASCII."""
+"""The linear motor on a Faulhaber drive of the 300x RS generation, with ASCII commands over RS232."""

@@ -1,4 +1,4 @@
-"""Faulhaber ASCII over RS232: commands and answers as bytes, without input or output.
+"""Faulhaber ASCII over RS232: encoding of commands and answers, without input or output.
 
 A command is ``NAME[argument]`` and CR; an answer is a line that ends with CR LF and names no command (sourced:
 Faulhaber manual MCBL 3564K024B CS, chapter 5, published at manualshive.com). Between a command and its answer the drive
@@ -14,37 +14,37 @@ from enum import Enum, IntFlag
 from typing import NamedTuple
 
 BITS_PER_BYTE = 10
-"""Start bit, 8 data bits, stop bit: 8N1 (sourced: the manual, page 13)."""
+"""Bits on the line for each byte: start bit, 8 data bits, stop bit (8N1) (sourced: the manual, page 13)."""
 LONGEST_LINE = 128
-"""Bytes after which a line without an end is given up (assumed)."""
+"""Number of bytes after which a line without an end is discarded (assumed)."""
 LONGEST_ANSWER = 34
-"""Bytes of the longest answer in the sources, the refusal of a drive that is too hot."""
+"""Length of the longest answer in the sources [bytes]: the refusal of a drive that is too hot."""
 
 OK = "OK"
 UNKNOWN_COMMAND = "Unknown command"
 INVALID_PARAMETER = "Invalid parameter"
 NOT_AVAILABLE = "Command not available"
 OVERTEMPERATURE = "Overtemperature - drive disabled"
-"""The manual typesets a dash; two public drivers match the hyphen (sourced)."""
+"""Answer of a drive that is too hot. The manual typesets a dash; two public drivers match the hyphen (sourced)."""
 REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE)
 NOTICES = "pvrfhtwx"
-"""Position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4 and 5.
+"""Notices: position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4, 5.
 
 Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
 ACKNOWLEDGED = frozenset(
     ("EN", "DI", "LA", "LR", "M", "V", "HO", "NP", "NPOFF", "SP", "AC", "DEC", "LL", "APL", "LPC", "LCC", "CORRIDOR",
      "ANSW", "SOR")
 )  # fmt: skip
-"""Commands that are answered ``OK`` (sourced: the manual)."""
+"""Commands that the drive answers by ``OK`` (sourced: the manual)."""
 TEXTS = ("VER", "GTYP", "GSER")
-"""Queries answered by a text; all others by a number."""
+"""Queries that the drive answers by a text; it answers all others by a number."""
 
 
 class Command(NamedTuple):
-    """One command as the drive reads it."""
+    """One command as read by the drive."""
 
     name: str
-    """Capital letters; empty: no command at all."""
+    """Name in capital letters; empty: not a readable command."""
     argument: int | None = None
 
 
@@ -54,17 +54,17 @@ def encode(name: str, argument: int | None = None) -> bytes:
 
 
 _COMMAND = re.compile(r"[0-9]{0,3}([A-Z]+)([+-]?[0-9]{1,19})?", re.ASCII)
-"""Before the name the address of a drive on a line with several: there is one here, so the address is ignored."""
+"""Pattern of a command. The address before the name, for lines with several drives, is ignored: there is one drive."""
 
 
 class CommandReader:
-    """Bytes of a host into commands, as the drive reads them: spaces and case do not count."""
+    """Conversion of a host's bytes to commands, as in the drive: spaces and case are ignored."""
 
     def __init__(self) -> None:
         self._line = b""
 
     def feed(self, data: bytes) -> list[Command]:
-        """Return the commands that `data` completes; one that cannot be read has an empty name."""
+        """Return the commands completed by `data`; a command that cannot be read has an empty name."""
         found = []
         *lines, rest = (self._line + data).split(b"\r")
         # One byte more than allowed is kept, so that the line cannot be read as a shorter one.
@@ -77,32 +77,32 @@ class CommandReader:
 
 
 class Kind(Enum):
-    """Kinds of lines from the drive."""
+    """Kinds of lines sent by the drive."""
 
     OK = "ok"
     VALUE = "value"
-    """An integer, or the 0s and 1s of GST and GFS."""
+    """An integer, or a row of 0 and 1 as answer to GST or GFS."""
     TEXT = "text"
     """Any other printable text."""
     REFUSAL = "refusal"
     NOTICE = "notice"
-    """Sent by the drive itself; never the answer to a command."""
+    """Message sent without a command; never the answer to a command."""
     GARBLED = "garbled"
-    """Not a line that a drive sends."""
+    """Text that no drive sends: damaged on the line."""
 
 
 class Line(NamedTuple):
-    """One line from the drive, without CR LF."""
+    """One line received from the drive, without CR LF."""
 
     kind: Kind
     text: str
     t_ns: int = 0
-    """Time of receipt of its first byte."""
+    """Time of receipt of the line's first byte [ns]."""
 
     def answers(self, name: str) -> bool:
-        """Return whether it may be the answer to a command; a refusal answers any.
+        """Return True if the line may be the answer to a command; a refusal may answer any command.
 
-        A late answer to an earlier command of the same kind passes: answers name no command.
+        A late answer to an earlier command of the same kind passes, too, as answers do not name their command.
         """
         if self.kind is Kind.REFUSAL:
             return True
@@ -136,14 +136,14 @@ def _read_line(raw: bytes, t_ns: int) -> Line:
 
 
 class LineReader:
-    """Bytes from the drive into lines; cut anywhere, and in step again after the next LF."""
+    """Conversion of the drive's bytes, cut anywhere, to lines; after damage it recovers at the next LF."""
 
     def __init__(self) -> None:
         self._line = b""
         self._began_ns = 0
 
     def feed(self, data: bytes, t_ns: int = 0) -> list[Line]:
-        """Return the lines that `data`, in the host at `t_ns`, completes, notices among them; raises nothing."""
+        """Return the lines completed by `data`, received at `t_ns`, including notices; raises no error."""
         if not self._line:
             self._began_ns = t_ns
         *ended, rest = (self._line + data).split(b"\n")
@@ -155,12 +155,12 @@ class LineReader:
         return found
 
     def clear(self) -> None:
-        """Forget an unfinished line: after a time-out, or a change of answer mode."""
+        """Discard an unfinished line, after a time-out or a change of the answer mode."""
         self._line = b""
 
 
 class OperationStatus(IntFlag):
-    """Bits of what OST answers (sourced: the manual, page 68); it has more, of programs and further inputs."""
+    """Bits of the answer to OST (sourced: the manual, page 68); others, of programs and more inputs, are left out."""
 
     CURRENT_LIMITATION = 1 << 4
     DEVIATION_ERROR = 1 << 5
@@ -170,7 +170,7 @@ class OperationStatus(IntFlag):
 
 
 class Configuration(IntFlag):
-    """Bits of CST that a public driver names (sourced); the others mean nothing here."""
+    """Bits of the answer to CST that a public driver names (sourced); others are ignored."""
 
     ACKNOWLEDGES = 1 << 2
     POWER_STAGE = 1 << 10
@@ -178,5 +178,5 @@ class Configuration(IntFlag):
 
 
 def line_time_s(n_bytes: int, baud: int) -> float:
-    """Return the seconds that `n_bytes` take on the line (derived: 10 bits a byte)."""
+    """Return the time that `n_bytes` bytes take on the line [s] (derived: 10 bits for each byte)."""
     return n_bytes * BITS_PER_BYTE / baud

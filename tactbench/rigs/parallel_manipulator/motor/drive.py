@@ -1,6 +1,6 @@
-"""The drive and its motor as a model: commands in, answers out, at any second; no bytes and no line.
+"""Model of the drive and its motor: it answers commands at any time, without encoding or a serial line.
 
-Behaviour without a public source is assumed, and marked so beside the code. The commands are those that a driver sends.
+Behaviour without a public source is assumed, as marked in the code. Only the commands sent by the driver are modelled.
 Quasi-static (assumed): the motor is where the reference is, as far as the load permits at the current limit, and
 accelerates as it brakes, by DEC. Lag, mass, friction and heat are left out; without power it stands.
 """
@@ -29,41 +29,41 @@ from tactbench.rigs.parallel_manipulator.motor.profile import (
 )
 
 Load = Callable[[float], float]
-"""Force on the motor [N], positive against positive motion, at a position [m]; it does not fall with position."""
+"""Function from the position [m] to the force on the motor [N], positive against positive motion, and not falling."""
 
 FORCE_CONSTANT_N_A = 6.5
-"""Of the emulated motor; this, the currents at power-on and the stops have the size of those of small tubular linear
-motors (assumed)."""
+"""Force constant of an emulated motor [N/A]; it, the currents at power-on and the stops have the size of those of small
+tubular linear motors (assumed)."""
 PEAK_CURRENT_A, CONTINUOUS_CURRENT_A = 1.6, 1.0
 STOPS_M = (-10e-3, 10e-3)
-"""Mechanical end stops, from the place at power-on."""
+"""Mechanical end stops [m], relative to the place at power-on."""
 
 _LARGEST = {
     "SP": LARGEST_SPEED, "AC": LARGEST_ACCELERATION, "DEC": LARGEST_ACCELERATION, "CORRIDOR": 32767,
     "LPC": LARGEST_CURRENT, "LCC": LARGEST_CURRENT, "APL": 1, "ANSW": 2, "SOR": 0,
 }  # fmt: skip
-"""Commands that set a number, and its largest value."""
+"""Commands that set a number, and the largest value of each number."""
 _READ_BACK = {"GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR"}
 _ABOUT = {"VER": "EMULATOR", "GTYP": "linear motor, Faulhaber ASCII", "GSER": "0"}
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
-    """The drive's text for a command that it does not execute."""
+    """The drive does not execute a command; the message is its answer."""
 
 
 class Motion:
-    """Pieces of constant acceleration, from a place [m] and a speed [m/s] at a second on."""
+    """Motion in pieces of constant acceleration, from a given place [m], speed [m/s] and time [s]."""
 
     def __init__(self, at_s: float, place_m: float, speed_m_s: float = 0.0) -> None:
         self._pieces = [(at_s, place_m, speed_m_s, 0.0)]
 
     @property
     def end_s(self) -> float:
-        """Beginning of the last piece, whose speed stays."""
+        """Time at which the last piece begins [s], at constant speed."""
         return self._pieces[-1][0]
 
     def at(self, t_s: float) -> tuple[float, float]:
-        """Return place and speed at a second."""
+        """Return place [m] and speed [m/s] at a time [s]."""
         began_s, place, speed, acceleration = next(
             (piece for piece in reversed(self._pieces) if piece[0] <= t_s), self._pieces[0]
         )
@@ -76,12 +76,12 @@ class Motion:
         self._pieces.append((began_s + seconds, *self.at(began_s + seconds), 0.0))
 
     def to_speed(self, speed: float, rate: float) -> None:
-        """Change to a speed at the end, at an acceleration that is positive."""
+        """Append a change to a speed [m/s], at a positive acceleration [m/s^2]."""
         change = speed - self._pieces[-1][2]
         self._extend(abs(change) / rate, math.copysign(rate, change))
 
     def to_position(self, target_m: float, speed: float, rate: float) -> None:
-        """End at rest on a target; speed and acceleration are positive."""
+        """Append a move that ends at rest on a target [m]; speed and acceleration are positive."""
         _, place, now, _ = self._pieces[-1]
         if now * (target_m - place) <= 0.0 or now**2 > 2 * rate * abs(target_m - place):
             self.to_speed(0.0, rate)  # away from it, or past it
@@ -100,25 +100,25 @@ class Motion:
 
 
 class Drive:
-    """A drive and its motor.
+    """Model of a drive with its motor.
 
     Parameters
     ----------
     load
-        Force on the motor; None: none, ever.
+        Function of the force on the motor; None: no force at any time.
     options
-        Units of the drive.
+        Options with the units of the drive.
     stops_m
-        Mechanical ends [m].
+        Mechanical ends of travel [m].
 
     Attributes
     ----------
     settings
-        Numbers by the command that sets them; LL has two, GPL and GNL.
+        Numbers by the command that sets them; those of LL are named GPL and GNL.
     now_s
-        The present second; it is set before each call.
+        Present time [s]; set before each call.
     hot
-        Too hot: without power, and none until it cools and is enabled again.
+        True if the drive is too hot: it has no power until it has cooled and is enabled again.
     """
 
     def __init__(self, load: Load | None, options: FaulhaberOptions, stops_m: tuple[float, float]) -> None:
@@ -136,22 +136,22 @@ class Drive:
         self._loaded_m: float | None = None
 
     def lose_power(self) -> None:
-        """Stand without power, as after DI."""
+        """Stop and switch the power off, as after DI."""
         self._motion = Motion(self.now_s, self.position_m)
         self.enabled = False
 
     @property
     def position_m(self) -> float:
-        """Of the motor."""
+        """Position of the motor [m]."""
         return self._pressed()[0]
 
     @property
     def moving(self) -> bool:
-        """Whether the reference moves, now or later, without a command."""
+        """True if the reference position moves, now or later, without a further command."""
         return self.now_s < self._motion.end_s or self._motion.at(self.now_s)[1] != 0.0
 
     def _pressed(self) -> tuple[float, float, bool]:
-        """Return the motor's place [m], its force [N], and whether the force is at the current limit."""
+        """Return the motor's place [m], its force [N], and True if the force is at the current limit."""
         reference_m = self._motion.at(self.now_s)[0]
         if not self.enabled:
             return reference_m, 0.0, False
@@ -173,12 +173,12 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Execute a command; return its answer.
+        """Execute a command; return the drive's answer.
 
         Raises
         ------
         Refused
-            If the drive does not execute it; its text is the answer.
+            If the drive does not execute the command; the message is the drive's answer.
         """
         name, argument = command
         if argument is None and (found := self._queried(name)) is not None:
@@ -221,7 +221,7 @@ class Drive:
         return self._options.acceleration_unit_m_s2 * self.settings["DEC"]
 
     def _begin(self) -> Motion:
-        """Return a new motion, from the present place and speed of the reference."""
+        """Return a new motion that starts from the reference's present place and speed."""
         self._motion = Motion(self.now_s, *self._motion.at(self.now_s))
         return self._motion
 

@@ -1,4 +1,4 @@
-"""The linear motor on a Faulhaber drive: set up, homed, moved, retreated, and watched. Positions are in metres."""
+"""Driver of the linear motor on a Faulhaber drive: set-up, homing, moves, retreat, polling. Positions are in metres."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange,
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 CORRIDOR_M = 0.2e-3
-"""Largest distance of target and position when the motor is switched on, and of position and `home_m` after homing
+"""Largest distance [m] of target and position when the motor is switched on, and of position and `home_m` after homing
 (assumed)."""
 LAG_S = 10e-3
-"""Time from the receipt of a command by the drive to the motor's braking (assumed)."""
+"""Time from the receipt of a command by the drive to the motor's braking [s] (assumed)."""
 LONGEST_AHEAD = 24
-"""Bytes that may be ahead of a retreat: a question and a move, `TPOS`, `SP10000`, `LA-12345`, `M` and CRs (derived)."""
+"""Largest number of bytes before a retreat: query and move, `TPOS`, `SP10000`, `LA-12345`, `M` and CRs (derived)."""
 TRIES = 5
-"""Answers of which two in a row must agree (assumed: damaged lines are rare)."""
+"""Number of answers among which two successive ones must agree (assumed: damaged lines are rare)."""
 STANDING_NS = 20_000_000
-"""Period of the status polls of a motor at rest, which leave the line and the host idle meanwhile (assumed)."""
+"""Period of the status polls of a motor at rest [ns]; line and host are idle in between (assumed)."""
 
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
 _WATCHED = ("POS", "GRC", "OST")
-_CHANGED = "Was it without power, or set by another program? Check the option against the drive's manual."
+_CHANGED = "Check if the drive was without power or set by another program, and the option against its manual."
 
 _Setting = tuple[str, int, str]
-"""Command, argument, and the query that reads it back."""
+"""Command, argument, and the query that reads the setting back."""
 
 
 def retreat_command(options: FaulhaberOptions) -> bytes:
-    """Return the bytes of a retreat, the same at any position; without a place of retreat, those of standing still.
+    """Return the bytes of a retreat, the same at any position; without a place of retreat, the bytes of a halt.
 
-    Raises RigError if the drive does not have the speed.
+    Raises RigError if the drive does not support the speed.
     """
     if options.retreat_m is None or options.retreat_speed_m_s is None:
         return encode("V", 0)
@@ -59,11 +59,11 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 
 
 class FaulhaberDriver(Positioner):
-    """A linear motor on a Faulhaber drive of the 300x RS generation.
+    """Driver of a linear motor on a Faulhaber drive of the 300x RS generation.
 
-    Position and current are polled as fast as the line allows while it moves, some 30 to 40 times a second at 9600 baud
-    and 200 at 115200, and 50 times where it stands. The time of a state is the receipt of the first byte of the
-    position's answer; the drive has read it a few bytes of line earlier. Every setting, limit and target is read back:
+    While the motor moves, position and current are polled as fast as the line permits, 30 to 40 times a second at 9600
+    baud, 200 times at 115200; at rest 50 times. The time of a state is the receipt of the first byte of the
+    position's answer; the drive has measured it a few bytes earlier. Every setting, limit and target is read back:
     the protocol has no checksum.
     """
 
@@ -79,18 +79,18 @@ class FaulhaberDriver(Positioner):
         self._turn = self._polled_ns = self._move_number = 0
         self._latest: dict[str, Answer] = {}
         self._usual = 0
-        """Speed of moves in the drive's units."""
+        """Usual speed of moves in the drive's units."""
         self._speed: int | None = None
-        """The drive's present speed; None: not known."""
+        """Present speed setting of the drive, in its units; None: not known."""
 
     @classmethod
     def facts_of(cls, options: FaulhaberOptions) -> PositionerFacts:
-        """Return the facts, with the drive's increment, and the line's and the motor's latency.
+        """Return the axis' properties, with the drive's increment, and the latency of line and motor.
 
         Raises
         ------
         RigError
-            For a setting that the drive does not have.
+            For a setting that the drive does not support.
         """
         _required(options)
         bytes_ahead = LONGEST_AHEAD + len(retreat_command(options))
@@ -105,11 +105,11 @@ class FaulhaberDriver(Positioner):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """The counts of :class:`Exchange` that are not 0."""
+        """Event counts of :class:`Exchange` that are not 0."""
         return +self._exchange.counts
 
     def identify(self) -> Mapping[str, str]:
-        """Return firmware, and model and serial number where the drive has them."""
+        """Return the drive's firmware, and its model and serial number if known."""
         found = {"firmware": self._exchange.greet()}
         for query, name in (("GTYP", "model"), ("GSER", "serial")):
             with suppress(MotorRefusalError):
@@ -117,7 +117,7 @@ class FaulhaberDriver(Positioner):
         return found
 
     def start(self) -> None:
-        """Let the drive acknowledge commands, set speeds and currents, read them back, and watch the motor."""
+        """Let the drive acknowledge commands, set and read back speeds and currents, and begin polling the motor."""
         if not self._exchange.version:
             self._exchange.greet()
         # No source states the answer to ANSW itself.
@@ -139,42 +139,42 @@ class FaulhaberDriver(Positioner):
         self._watching = True
 
     def stop(self) -> None:
-        """Watch no more. The motor ends the move it has, and holds."""
+        """Stop polling. The motor completes its move, and holds."""
         self._watching = False
         super().stop()
 
     # Power and place --------------------------------------------------------------------------------------------------
 
     def enable(self) -> None:
-        """Give the motor power; it holds its place. One whose target is elsewhere is without power again."""
+        """Give the motor power; it holds its place. If its target is elsewhere, power is switched off again."""
         self._ask("EN")
         self.enabled = self._has(Configuration.POWER_STAGE)
         if not self.enabled:
-            raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its supply.")
+            raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its power supply.")
         place_m, target_m = self.locate()
         if abs(place_m - target_m) > CORRIDOR_M:
             self.disable()
             raise PositionerError(
-                f"The motor is at {place_m:g} m, its target at {target_m:g} m: its power was taken off again.",
+                f"The motor is at {place_m:g} m, its target at {target_m:g} m: its power was switched off again.",
                 hint="Home it anew.",
             )
 
     def disable(self) -> None:
-        """Take the motor's power; it can be pushed then, and falls where nothing holds it."""
+        """Switch the motor's power off; it can be pushed then, and falls unless something holds it."""
         self._forget()
         self._ask("DI")
         self.enabled = False
 
     def locate(self) -> tuple[float, float]:
-        """Query target and place, each until two answers are the same, and return place and target [m]."""
+        """Query target and position, each until two successive answers agree; return position and target [m]."""
         self._goal, place_m = (self.options.position_m(self._sure(query)) for query in ("TPOS", "POS"))
         self.note(PositionerState(self.clock(), place_m, self._goal))
         return place_m, self._goal
 
     def find_home(self) -> bool:
-        """Return whether the drive has kept power and the ends of travel that homing set; its zero is the same then.
+        """Return True if the drive has kept power and the ends of travel set by homing; then its zero is the same.
 
-        A drive that was without supply has neither (assumed: its power stage is off until EN).
+        A drive that was without supply has kept neither (assumed: its power stage is off until EN).
         """
         self.homed = (
             bool(self._limits)
@@ -186,10 +186,10 @@ class FaulhaberDriver(Positioner):
         return self.homed
 
     def home(self, stop: Callable[[], bool] = lambda: False) -> None:
-        """Find the place that positions count from, as the options say, and set the ends of travel.
+        """Find the origin of positions, as the options state, and set the ends of travel.
 
-        The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive has its
-        usual limits of current again once the place is found.
+        The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive gets
+        its usual current limits again once the origin is found.
         """
         if self.moving or not self._limits:
             raise NotReadyError(
@@ -218,7 +218,7 @@ class FaulhaberDriver(Positioner):
             self.finish(stop)
 
     def confirm(self) -> None:
-        """Read back all settings and the ends of travel that options state; raises PositionerError if one differs."""
+        """Read back all settings and ends of travel of the options; raises PositionerError if a value differs."""
         for setting in (*self._settings, *self._limits):
             # The speed of the last retreat may still be set.
             (self._keep if setting[0] == "SP" else self._same)(*setting)
@@ -227,10 +227,10 @@ class FaulhaberDriver(Positioner):
 
     def _check_limits(self) -> None:
         if not self._has(Configuration.POSITION_LIMITS):
-            raise PositionerError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
+            raise PositionerError("The motor's drive has lost its ends of travel.", hint="Home it anew.")
 
     def _against_stop(self, stop: Callable[[], bool]) -> None:
-        """Run at a speed and with little current until the motor stands at its current limit, twice in a row."""
+        """Run at the homing speed and current until the motor stands at its current limit in two successive polls."""
         little = self.options.current(self.options.homing_current_a)
         before = [("LPC", self._sure("GPC"), "GPC"), ("LCC", self._sure("GCC"), "GCC")]
         for command, argument, query in before:
@@ -244,8 +244,8 @@ class FaulhaberDriver(Positioner):
                 times = times + 1 if limited else 0
                 for ended, why in (
                     (status & _FAULTS, "the drive reports a fault"),
-                    (stop(), "it was stopped"),
-                    (self.clock() > until_ns, f"it was not there within {HOMING_S:g} s"),
+                    (stop(), "homing was stopped"),
+                    (self.clock() > until_ns, f"not reached within {HOMING_S:g} s"),
                 ):
                     if ended:
                         raise PositionerError(
@@ -260,15 +260,15 @@ class FaulhaberDriver(Positioner):
     # Motion -----------------------------------------------------------------------------------------------------------
 
     def move_to(self, position: float, speed: float | None = None) -> float:
-        """Begin to move to a position, to the nearest increment; the speed is rounded down."""
+        """Begin a move to the increment nearest to a position; the speed is rounded down."""
         self.check_move(position)
         units = self._usual if speed is None else self.options.speed(speed)
         return self._go(self.options.increments(position), units)
 
     def halt(self) -> None:
-        """Begin to move to the position that was last read, whatever is under way: it brakes and holds there.
+        """Begin a move to the position read last, whatever is under way: the motor brakes and holds there.
 
-        Where its place is not known it gets a speed of 0.
+        If the position is not known, the speed is set to 0 instead.
         """
         if self.state is None or not self.homed:
             self._exchange.send("V", 0)
@@ -276,10 +276,10 @@ class FaulhaberDriver(Positioner):
         self._go(self.options.increments(self.position), self._speed or self._usual)
 
     def retreat(self) -> None:
-        """Begin to move to the place away from the sensor, whatever is under way; it halts without one, or a home.
+        """Begin a move to the place away from the sensor, whatever is under way; halt if it is not stated or not homed.
 
-        If the drive does not answer, `update` raises PositionerSilentError: call this again, its bytes are the same at
-        any position.
+        If the drive does not answer, `update` raises PositionerSilentError: call this again; the bytes sent are the
+        same at any position.
         """
         if math.isnan(self.facts.retreat) or not self.homed:
             self.halt()
@@ -302,16 +302,16 @@ class FaulhaberDriver(Positioner):
         return target_m
 
     def _forget(self) -> None:
-        """Treat target and speed as unknown: the last command may have been carried out or not."""
+        """Treat target and speed as unknown: the last command may or may not have been carried out."""
         self._moving = self._confirming = False
         self._goal, self._speed = math.nan, None
         self._move_number += 1
         self.state = self.state and replace(self.state, target=math.nan)
 
     def rescue(self, within_s: float | None) -> float:
-        """Retreat, or stand, with a drive that another process had, and which keeps its positions; see `Positioner`.
+        """Retreat or halt a drive set up by another process, whose positions are still valid; see `Positioner`.
 
-        Half a command that may stand on the line is ended first.
+        An incomplete command that may be on the line is ended first.
         """
         command = encode("V", 0) if within_s is None else retreat_command(self.options)
         self.link.write(b"\r" + command)
@@ -326,7 +326,7 @@ class FaulhaberDriver(Positioner):
     # Commands that are waited for -------------------------------------------------------------------------------------
 
     def _ask(self, name: str, argument: int | None = None) -> Answer:
-        """Return the answer to a command once it is received; a query without an answer is sent again."""
+        """Send a command and return its answer; a query without an answer is sent again."""
         while True:
             while not self._exchange.ready:
                 for answer in self._exchange.pump(self._exchange.answer_s):
@@ -337,20 +337,20 @@ class FaulhaberDriver(Positioner):
                 return answer
 
     def _sure(self, query: str) -> int:
-        """Return a number that two answers in a row agree on: there is no checksum."""
+        """Return the number on which two successive answers agree: the protocol has no checksum."""
         before = None
         for _ in range(TRIES):
             value = self._ask(query).value
             if value == before:
                 return value
             before = value
-        raise PositionerError(f"Two answers to {query} in a row always differ.", hint="Is the motor at rest?")
+        raise PositionerError(f"Successive answers to {query} always differ.", hint="Let the motor come to rest.")
 
     def _has(self, bits: Configuration) -> bool:
         return self._sure("CST") & bits == bits
 
     def _keep(self, command: str, argument: int, query: str) -> None:
-        """Set a number and read it back, once more if a digit was damaged on its way."""
+        """Set a number and read it back; repeat this once if a digit was damaged on the line."""
         self._ask(command, argument)
         if self._sure(query) != argument:
             self._ask(command, argument)
@@ -358,12 +358,12 @@ class FaulhaberDriver(Positioner):
 
     def _same(self, command: str, argument: int, query: str) -> None:
         if (found := self._sure(query)) != argument:
-            raise PositionerError(f"The drive has {query} {found} where {command}{argument} was set.", hint=_CHANGED)
+            raise PositionerError(f"The drive has {query} {found} after {command}{argument} was set.", hint=_CHANGED)
 
     # Polling ----------------------------------------------------------------------------------------------------------
 
     def update(self, timeout_s: float = 0.0) -> None:
-        """Send the next query, take answers, waiting at most `timeout_s` for a byte of one; raise what is wrong."""
+        """Send the next query, read answers, waiting at most `timeout_s` for a byte; raise an error if it is wrong."""
         self._poll()
         if self._exchange.ready and self._watching:  # it stands: until the next poll
             timeout_s = min(timeout_s, max(0.0, 1e-9 * (self._polled_ns + STANDING_NS - self.clock())))
@@ -386,7 +386,7 @@ class FaulhaberDriver(Positioner):
             self._exchange.send(_WATCHED[self._turn])
 
     def _take(self, answer: Answer) -> None:
-        """Process an answer that no caller waits for; raises what is wrong."""
+        """Process an answer that no caller waits for; raises an error if it is wrong."""
         if answer.name in _WATCHED:
             # The three belong together: after a lost answer they are queried again from the first.
             self._turn = 0 if answer.line is None else (self._turn + 1) % len(_WATCHED)
@@ -397,8 +397,8 @@ class FaulhaberDriver(Positioner):
             self._confirming = False
             if answer.value != self.options.increments(self._goal):
                 raise PositionerError(
-                    f"The motor's target is {self.options.position_m(answer.value):g} m, not {self._goal:g} m.",
-                    hint="A byte was damaged on the line: let it retreat, and check the cable.",
+                    f"The drive has the target {self.options.position_m(answer.value):g} m, not {self._goal:g} m.",
+                    hint="A byte was damaged on the line: let the motor retreat, and check the cable.",
                 )
         elif answer.of == self._move_number:
             answer.checked()
@@ -406,7 +406,7 @@ class FaulhaberDriver(Positioner):
                 self._acknowledged = self._confirming = True
 
     def _note_status(self) -> None:
-        """Note position, current and status; the move has ended where the drive says so after its acknowledgement."""
+        """Store position, current and status; a move has ended if the drive reports so after acknowledging it."""
         position, current, status_ = (self._latest[name] for name in _WATCHED)
         status = OperationStatus(status_.value)
         problem = ", ".join(str(bit.name).lower().replace("_", " ") for bit in status & _PROBLEMS)
@@ -424,7 +424,7 @@ class FaulhaberDriver(Positioner):
 
 
 def _required(options: FaulhaberOptions) -> tuple[list[_Setting], list[_Setting]]:
-    """Return the settings and the ends of travel that the options state; raises RigError if the drive has no such."""
+    """Return settings and ends of travel as stated by the options; raises RigError if the drive lacks such a value."""
     stated = (
         ("SP", options.speed, options.speed_m_s, "GSP"),
         ("AC", options.acceleration, options.acceleration_m_s2, "GAC"),

@@ -1,4 +1,4 @@
-"""The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output.
+"""Emulator of the motor's drive on its line: answers bytes with bytes at times passed in, without input or output.
 
 A :class:`tactbench.plugin.devices.DeviceEmulator`.
 """
@@ -27,11 +27,11 @@ from tactbench.rigs.parallel_manipulator.motor.drive import STOPS_M, Drive, Load
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 ANSWER_S = 1e-3
-"""From the end of a command to the start of its answer (assumed)."""
+"""Time from the end of a command to the start of its answer [s] (assumed)."""
 TICK_S = 1e-3
-"""Period of the polls while the motor moves."""
+"""Period of the emulator's events while the motor moves [s]."""
 BEYOND_M = 2e-3
-"""Distance of an emulated motor's stops from the ends of travel that its options state (assumed)."""
+"""Distance of an emulated motor's end stops from the ends of travel in its options [m] (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -39,29 +39,29 @@ class MotorFault(Fault):
     """A fault of the drive or its line."""
 
     known: ClassVar[Mapping[str, str]] = {
-        "motor-fault": "too hot: without power until it is over and the drive is enabled again",
-        "late-answers": "answers, not notices, come later by delay_s",
-        "garbled-line": "one byte of a line is another one",
+        "motor-fault": "too hot: without power until the fault is over and the drive is enabled again",
+        "late-answers": "answers, but not notices, come later by delay_s",
+        "garbled-line": "one byte of a line is replaced by another",
     }
     delay_s: float = 0.25
-    """Seven times the longest answer at 9600 baud."""
+    """Delay by the fault [s]: seven times the longest answer at 9600 baud."""
 
 
 class MotorEmulator(DeviceEmulator):
-    """A drive with its motor, and its line's pace.
+    """Emulated drive with its motor, and the speed of its serial line.
 
     Parameters
     ----------
     load
-        Force on the motor; None: none, ever.
+        Function of the force on the motor; None: no force at any time.
     rng
-        Draws the bytes of garbled lines.
+        Random generator for the bytes of garbled lines.
     options
-        Units of the drive, rate of its line, and the place at which homing finds it.
+        Options: units of the drive, rate of its line, and position of the home.
     stops_m
-        Mechanical ends, from the place at power-on.
+        Mechanical ends of travel [m], relative to the place at power-on.
     faults
-        Its faults; may be changed at any time.
+        Faults of the drive; may be changed at any time.
     """
 
     def __init__(
@@ -93,13 +93,13 @@ class MotorEmulator(DeviceEmulator):
         return self.drive.position_m + self._begins_m
 
     def press_against(self, force_n: Callable[[float], float] | None) -> None:
-        """Let a force [N], given at such a position, act on the motor; None: no force."""
+        """Let a force [N], given as function of :attr:`position_m`, act on the motor; None: no force."""
         self.drive.load = None if force_n is None else lambda at_m: force_n(at_m + self._begins_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
-        """Take bytes that the host sends from `now_s` on, at the line's rate; return as `poll`.
+        """Process bytes sent by the host from `now_s` on, at the line's rate; return the same as `poll`.
 
-        Times do not go back: an earlier one counts as the latest.
+        Time never goes back: a time before the latest counts as the latest.
         """
         assert isinstance(piece, bytes)
         self._in_free_s = max(self._in_free_s, now_s, self._now_s)
@@ -109,7 +109,7 @@ class MotorEmulator(DeviceEmulator):
         return self.poll(now_s)
 
     def poll(self, now_s: float) -> list[Sent]:
-        """Go on to `now_s`; return the pieces sent by then, of each line the first byte and the rest."""
+        """Advance to `now_s`; return the data sent until then: of each line the first byte, then the rest."""
         now_s = max(now_s, self._now_s)
         while self._in and self._in[0][0] <= now_s:
             at_s, part = self._in.popleft()
@@ -123,7 +123,7 @@ class MotorEmulator(DeviceEmulator):
         return found
 
     def next_s(self) -> float:
-        """Return the time of the next event: a command in, a line out, a fault, a poll of a motor that moves."""
+        """Return the time [s] of the next event: a command received, a line sent, a fault, or a moving motor's tick."""
         faults_s = [fault.start_s for fault in self.faults if fault.start_s > self._now_s]
         queues_s = [queue[0][0] for queue in (self._in, self._out) if queue]
         return min([*queues_s, *faults_s, self._now_s + TICK_S if self.drive.moving else math.inf])
@@ -161,7 +161,7 @@ class MotorEmulator(DeviceEmulator):
 
 
 def build(settings: EmulatorSettings) -> MotorEmulator:
-    """Return an emulated drive; raises UsageError for options or faults that are not known."""
+    """Return an emulated drive; raises UsageError for unknown options or faults."""
     options = read_options(FaulhaberOptions, settings.options, "faulhaber")
     low, high = STOPS_M
     if options.homing == "here" and options.lower_m is not None and options.upper_m is not None:

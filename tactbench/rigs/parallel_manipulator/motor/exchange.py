@@ -1,4 +1,4 @@
-"""Commands and answers on the drive's line: in order, within their time, apart from notices.
+"""Exchange of commands and answers with the drive: assigned in order, with timeouts, and separated from notices.
 
 Answers name no command and have no checksum; the drive answers in the order of commands (sourced as in ``codec.py``).
 So after a lost answer no line is assigned until the drive has answered a query whose answer is known: lines before that
@@ -15,35 +15,35 @@ from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerErr
 from tactbench.rigs.parallel_manipulator.motor.codec import LONGEST_ANSWER, Kind, Line, LineReader, encode, line_time_s
 
 MARK = "VER"
-"""The query whose answer is known: the drive's version does not change."""
+"""Query with a known answer, the drive's version."""
 IN_A_ROW = 3
-"""Lost answers one after the other, after which the drive counts as silent (assumed)."""
+"""Number of successive lost answers after which the drive counts as silent (assumed)."""
 HOST_S = 0.15
-"""Added to the time of the line: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by some
-60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
+"""Time added to that of the line [s]: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by
+some 60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
 
 
 class MotorRefusalError(PositionerError):
-    """The drive refuses a command."""
+    """The drive has refused a command."""
 
 
 class Answer(NamedTuple):
-    """The outcome of a command."""
+    """Outcome of a command: the answer, or its absence."""
 
     name: str
     argument: int | None
     of: int | None
-    """The number that `send` got with it."""
+    """Number that was given to `send` with the command."""
     line: Line | None = None
-    """None: no answer came in time."""
+    """Line of the answer; None: no answer came in time."""
 
     @property
     def value(self) -> int:
-        """The integer; raises as :meth:`checked`."""
+        """The answer's integer; raises the errors of :meth:`checked`."""
         return int(self.checked().text)
 
     def checked(self) -> Line:
-        """Return the line; raises PositionerSilentError if none came, MotorRefusalError if the drive refuses."""
+        """Return the line; raises PositionerSilentError if no answer came, MotorRefusalError if the drive refuses."""
         text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
             raise PositionerSilentError(
@@ -52,32 +52,32 @@ class Answer(NamedTuple):
             )
         if self.line.kind is Kind.REFUSAL:
             raise MotorRefusalError(
-                f"The motor's drive answers {text} with: {self.line.text}.",
-                hint="Is it of the 300x RS generation, enabled and cool? Check the rig file against its manual.",
+                f"The motor's drive refuses {text}: {self.line.text}.",
+                hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
             )
         return self.line
 
 
 class Exchange:
-    """Sends commands and assigns lines to them.
+    """Exchange that sends commands and assigns the received lines to them.
 
     Parameters
     ----------
     link
-        To the drive.
+        Link to the drive.
     clock
-        Of the link.
+        Clock of the link [ns].
     baud
-        Of the line: timeouts depend on it.
+        Rate of the line [bit/s], on which timeouts depend.
 
     Attributes
     ----------
     version
-        The drive's, once :meth:`greet` has read it.
+        Version of the drive, once :meth:`greet` has read it.
     fault
-        Whether the drive has sent the notice of a fault since this was last set back.
+        True if the drive has sent notice of a fault since this attribute was last reset.
     counts
-        ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
+        Event counts: ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
     """
 
     def __init__(self, link: ByteLink, clock: Clock, baud: int) -> None:
@@ -93,23 +93,23 @@ class Exchange:
 
     @property
     def ready(self) -> bool:
-        """Whether no answer is outstanding."""
+        """True if no answer is outstanding."""
         return not self._out and not self._marking
 
     def send(self, name: str, argument: int | None = None, of: int | None = None) -> None:
-        """Send a command now, also while others are out: the drive keeps their order. `of` comes with the answer."""
+        """Send a command now, even if answers are outstanding: the drive keeps the order. The answer carries `of`."""
         if not self._out:
             self._since_ns = self._clock()
         self._link.write(encode(name, argument))
         self._out.append(Answer(name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
-        """Read lines, waiting at most so long for the first byte; return the outcomes of commands.
+        """Read lines, waiting at most `timeout_s` for the first byte; return the outcomes of commands.
 
         Raises
         ------
         PositionerSilentError
-            If three answers in a row did not come.
+            If three successive answers were lost.
         LinkUnplugged
             If the link is gone.
         """
@@ -123,7 +123,7 @@ class Exchange:
         return found if found or self.ready or self._clock() < due_ns else self._overdue()
 
     def ask(self, name: str, argument: int | None = None) -> Answer:
-        """Send a command while none is outstanding, and return its outcome; raises as :meth:`pump`."""
+        """Send a command while no answer is outstanding, and return its outcome; raises the errors of :meth:`pump`."""
         self.send(name, argument)
         found: list[Answer] = []
         while not found:
@@ -131,12 +131,12 @@ class Exchange:
         return found[0]
 
     def greet(self) -> str:
-        """Find the drive: end a partial command on its line, and read its version until two answers are the same.
+        """Find the drive: end a partial command on its line, and read its version until two answers agree.
 
         Raises
         ------
         LinkTimeout
-            If it does not answer.
+            If the drive does not answer.
         """
         self._link.write(b"\r")
         self.quiet()
@@ -150,13 +150,13 @@ class Exchange:
                 return before
             before = "" if line is None else line.text
         raise LinkTimeout(
-            f"No drive on {self._link.address} answers {MARK} twice with the same.",
+            f"No drive on {self._link.address} gives the same answer to {MARK} twice.",
             hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "
             "newer, binary generation cannot be used.",
         )
 
     def quiet(self) -> None:
-        """Drop what is received until the line was silent for the time of an answer; at most ten times that."""
+        """Drop data until the line has been silent for the time of an answer; for at most ten times this time."""
         deadline = self._clock() + round(1e10 * self.answer_s)
         with suppress(LinkTimeout):
             while self._clock() < deadline:
@@ -183,7 +183,7 @@ class Exchange:
         return []
 
     def _overdue(self) -> list[Answer]:
-        """Give up all outstanding answers, and send the mark; raises PositionerSilentError."""
+        """Give up all outstanding answers, and send the query `MARK`; raises PositionerSilentError after too many."""
         lost = list(self._out)
         self._out.clear()
         self._reader.clear()
@@ -194,7 +194,7 @@ class Exchange:
             raise PositionerSilentError(
                 f"The motor's drive on {self._link.address} is silent: {IN_A_ROW} answers in a row did not come within "
                 f"{self.answer_s:.2f} s.",
-                hint="Check its power and cable. The motor, if it moves, ends its last move and holds.",
+                hint="Check its power and cable. A moving motor completes its last move and holds.",
             )
         if self.version:
             self._marking, self._since_ns = True, self._clock()

@@ -1,4 +1,4 @@
-"""Net F/T raw data transfer (RDT): requests and records as bytes, without input or output.
+"""Net F/T raw data transfer (RDT): encoding of requests and records, without input or output.
 
 UDP, port 49152 of the sensor. A request has 8 bytes, a record 36, both big-endian (sourced: netft/pyNetFT,
 core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
@@ -27,31 +27,31 @@ _RECORD = struct.Struct(">III6i")
 _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
 RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
-"""The same as `_RECORD`, for arrays."""
+"""Structured dtype of a record, with the same fields as `_RECORD`, for arrays."""
 SEQUENCE_MODULUS = 1 << 32
 SENSOR_RATE_HZ = 7000
-"""The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
+"""Sampling rate [Hz]; the box sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
 public client)."""
 AXES = ("fx", "fy", "fz", "tx", "ty", "tz")
 STREAM = "force_torque"
 
 
 class NetFtOptions(Options):
-    """Options of a box in a rig file, all of them on the box's web page."""
+    """Options of a Net F/T box in a rig file, as set on the box's web page."""
 
     rate_hz: float = Field(default=1000.0, gt=0.0, le=SENSOR_RATE_HZ)
-    """Records a second that the box sends, as set on its web page: no request sets them."""
+    """Records sent per second, as set on the box's web page: no request can change this rate."""
     counts_per_newton: float = Field(gt=0.0)
     counts_per_newton_metre: float = Field(gt=0.0)
 
     @property
     def every(self) -> int:
-        """Samples of the sensor from one record to the next."""
+        """Number of sensor samples from one record to the next."""
         return max(1, int(SENSOR_RATE_HZ // self.rate_hz))
 
     @property
     def stream(self) -> StreamSpec:
-        """Forces [N] and torques [N*m] in the sensor's own axes, at the rate as the box rounds it."""
+        """Stream of forces [N] and torques [N*m] in the sensor's own axes, at the rate rounded as in the box."""
         channels = [
             ChannelSpec(name=name, kind="force", unit="N") if name.startswith("f")
             else ChannelSpec(name=name, kind="torque", unit="N*m")
@@ -60,7 +60,7 @@ class NetFtOptions(Options):
         return StreamSpec(name=STREAM, rate_hz=SENSOR_RATE_HZ / self.every, channels=tuple(channels))
 
     def wrench(self, counts: npt.ArrayLike) -> FloatArray:
-        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
+        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] for (…, 6) counts of a record."""
         wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors
         return wrench
 
@@ -76,60 +76,60 @@ class NetFtOptions(Options):
 
 
 class DatagramError(RigError, ValueError):
-    """A datagram is not one of this protocol."""
+    """A datagram does not belong to this protocol."""
 
 
 class Command(IntEnum):
-    """Commands of a request; the box has more, which no driver here sends."""
+    """Commands of a request; others of the box are not used here."""
 
     STOP = 0x0000
     START_REALTIME = 0x0002
 
 
 def encode_request(command: Command, records: int = 0) -> bytes:
-    """Return the 8 bytes of a request for so many records; 0: until stopped."""
+    """Return the 8 bytes of a request for `count` records; 0: records until stopped."""
     return _REQUEST.pack(_HEADER, command, records)
 
 
 def decode_request(data: bytes) -> tuple[Command, int]:
-    """Return command and number of records in a datagram; raises DatagramError if it is no request."""
+    """Return command and number of records in a datagram; raises DatagramError if it is not a request."""
     try:
         header, command, count = _REQUEST.unpack(data)
         if header == _HEADER:
             return Command(command), count
     except (struct.error, ValueError):
         pass
-    raise DatagramError(f"{data!r} is no request of {_REQUEST.size} bytes, header {_HEADER:04X} and a known command.")
+    raise DatagramError(f"{data!r} is not a request: {_REQUEST.size} bytes, header {_HEADER:04X}, known command.")
 
 
 def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Iterable[int]) -> bytes:
-    """Return the 36 bytes of a record: its number, the number of the sensor's sample, both modulo 2^32, six counts."""
+    """Return the 36 bytes of a record: record number and sample number, both modulo 2^32, status, and six counts."""
     return _RECORD.pack(rdt_sequence, ft_sequence, status, *counts)
 
 
 def decode_records(data: bytes) -> npt.NDArray[np.void]:
-    """Return the records of a datagram, or of several joined, an array of :data:`RECORDS`.
+    """Return the records of one datagram, or of several joined, as an array of dtype :data:`RECORDS`.
 
     Raises
     ------
     DatagramError
-        If it is not one or more whole records.
+        If the data are not one or more whole records.
     """
     if not data or len(data) % RECORD_BYTES:
-        raise DatagramError(f"{len(data)} bytes are no records of {RECORD_BYTES} bytes.")
+        raise DatagramError(f"{len(data)} bytes are not a whole number of records of {RECORD_BYTES} bytes.")
     return np.frombuffer(data, RECORDS)
 
 
 ERROR_SUMMARY, SATURATION, CONDITION_LATCHED = 0x80000000, 0x00020000, 0x00010000
 WARNING = ERROR_SUMMARY | CONDITION_LATCHED
-"""The status where a threshold set in the box was passed; its values are good (sourced: pyNetFT, status.cpp)."""
+"""Status word after a threshold set in the box was passed; its record is good (sourced: pyNetFT, status.cpp)."""
 
 
 def quality(status: int) -> Quality:
-    """Return the mark of all six channels: saturation is distinguished from other errors.
+    """Return the quality mark of all six channels, which distinguishes saturation from other errors.
 
-    Errors are SUSPECT, not MISSING: the box forbids the use of the values, yet many of its bits (of the network, of
-    other buses) do not concern them, and a mark keeps both facts.
+    Errors are SUSPECT, not MISSING: the box's manual forbids use of the values, yet many status bits (on networks and
+    other buses) do not concern the values, and the mark SUSPECT keeps them for the user's decision.
     """
     if status in (0, WARNING):
         return Quality.GOOD

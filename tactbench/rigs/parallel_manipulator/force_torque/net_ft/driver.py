@@ -1,4 +1,4 @@
-"""The driver of a Net F/T box: records over UDP into blocks, all of them, in the order of receipt."""
+"""The driver of a Net F/T box: it converts all records received over UDP to blocks, in the order of receipt."""
 
 from __future__ import annotations
 
@@ -32,30 +32,30 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 )
 
 QUIET_S = 0.05
-"""Silence after which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
+"""Time without data after which a stopped box sends no more [s] (assumed: a network of one cable, a busy host)."""
 MOST_SILENCED = 4096
-"""Largest number of datagrams that are dropped of a box that does not stop: 4 s at 1 kHz."""
+"""Largest number of datagrams dropped while waiting for a box to stop: 4 s at 1 kHz."""
 ANSWER_S = 0.5
-"""Longest time of an answer beside that of its records (assumed: a network of one cable)."""
+"""Longest time for an answer, besides the time of its records [s] (assumed: a network of one cable)."""
 
 
 def _other_length(piece: Received) -> RigError:
     return RigError(
         f"A datagram of {len(piece.data)} bytes was received; one record has {RECORD_BYTES} bytes.",
-        hint="Set the RDT buffer size on the box's web page to 1: one record a datagram.",
+        hint="Set the RDT buffer size on the box's web page to 1, for one record in each datagram.",
     )
 
 
 class NetFtDriver(Driver):
-    """A box on a datagram link.
+    """Driver of a Net F/T box on a datagram link.
 
-    Blocks hold every record in the order of receipt: `sequence` is the record's own number, so that one received twice
-    has the same and one received late a lower one. `device_ns` is the box's count of its own samples at 7 kHz, as time:
-    a clock as good as the box's oscillator, and only while it samples. `t_ns` is the receipt.
+    Blocks hold every record in the order of receipt: `sequence` is the record's own number, so that a record received
+    twice has the same number, a late record a lower one. `device_ns` is the box's count of samples at 7 kHz, as time: a
+    clock as exact as the box's oscillator, running only while it samples. `t_ns` is the time of receipt.
 
-    A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, and both both; a
-    threshold set in the box is a warning: it is counted, its values are good. `read` of a silent box returns no block.
-    A box that was without power counts anew, and stays silent until it is started.
+    A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, both
+    together both. A passed threshold set in the box is counted as warning, its values are good. `read` of a silent box
+    returns no block. After a loss of power, the box counts from 0, and is silent until started.
     """
 
     device, link_kind, address = "net-ft", DatagramLink, "udp://192.168.1.1:49152"
@@ -72,21 +72,21 @@ class NetFtDriver(Driver):
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        """`force_torque`, at the rate that the options state, as the box rounds it."""
+        """Stream `force_torque`, at the rate of the options, rounded as in the box."""
         return (self.options.stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """``rejected`` datagrams; records with ``errors``, ``saturated`` ones among them, and with ``warnings``."""
+        """Counts of ``rejected`` datagrams, of records with ``errors``, ``saturated`` (an error) or ``warnings``."""
         return +self._counts
 
     def identify(self) -> Mapping[str, str]:
-        """Read two records; return rate and status.
+        """Read two records; return the box's rate and status as texts.
 
         Raises
         ------
         LinkTimeout
-            If two records in a row do not come.
+            If the box does not send two successive records.
         RigError
             If the box sends at another rate than the options state, or several records in a datagram.
         """
@@ -97,19 +97,19 @@ class NetFtDriver(Driver):
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
         if every != self.options.every:
             raise RigError(
-                f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected was every "
+                f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected is every "
                 f"{self.options.every}th (rate_hz: {self.options.rate_hz:g}).",
-                hint=f"Set the RDT rate on its web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
+                hint=f"Set the RDT rate on the box's web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
             )
         return {"rate_hz": f"{SENSOR_RATE_HZ / every:.6g}", "status": f"{int(second['status']):08X}"}
 
     def start(self) -> None:
-        """Let the box send, and wait for the first datagram.
+        """Let the box send records, and wait for its first datagram.
 
         Raises
         ------
         LinkTimeout
-            If none comes.
+            If no datagram comes.
         """
         if not self._silent:  # the other devices of a rig sample already, and would wait
             self._silence()
@@ -121,7 +121,7 @@ class NetFtDriver(Driver):
         self._kept = [self._next()]
 
     def read(self, timeout_s: float) -> list[Block]:
-        """Return the records that were received.
+        """Return the records received since the last call.
 
         Raises
         ------
@@ -140,14 +140,14 @@ class NetFtDriver(Driver):
         return [self._block(records)] if records else []
 
     def stop(self) -> None:
-        """Let the box send no more, and wait until it is silent."""
+        """Stop the box from sending, and wait until it is silent."""
         if self._sampling:
             self._sampling, self._kept = False, []
             with suppress(LinkError):
                 self._silence()
 
     def _silence(self) -> None:
-        """Stop the box, and drop all that it sent before: records of an earlier start would seem to be of the next."""
+        """Stop the box, and drop its earlier records, which would otherwise seem to belong to the next start."""
         self.link.send(encode_request(Command.STOP))
         with suppress(LinkTimeout):
             for _ in range(MOST_SILENCED):
@@ -155,7 +155,7 @@ class NetFtDriver(Driver):
         self._silent = True
 
     def _next(self) -> Received:
-        """Return the next record; raises LinkTimeout if none comes, and RigError for a datagram of another length."""
+        """Return the next record; raises LinkTimeout if no record comes, and RigError for a wrong length."""
         piece: Received = self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
         if len(piece.data) != RECORD_BYTES:
             raise _other_length(piece)

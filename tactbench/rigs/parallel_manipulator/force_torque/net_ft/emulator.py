@@ -1,4 +1,4 @@
-"""A Net F/T box as a model without input or output: requests in, datagrams out, on a clock that is passed in.
+"""Emulator of a Net F/T box: answers requests with datagrams, without input or output, at times passed in.
 
 A :class:`tactbench.plugin.devices.DeviceEmulator`.
 """
@@ -36,7 +36,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 
 @dataclass(frozen=True)
 class DatagramFault(Fault):
-    """A fault of the sensor or of the network."""
+    """A fault of the force sensor or of the network."""
 
     known: ClassVar[Mapping[str, str]] = {
         "dropped": "a datagram does not arrive",
@@ -51,17 +51,17 @@ LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
 
 
 class RdtEmulator(DeviceEmulator):
-    """A box and its sensor, which reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m]; the rest is 0.
+    """A box with its sensor, which reads fx, fy, fz [N], tx, ty, tz [N*m] of `settings.senses`; others are 0.
 
     Attributes
     ----------
     faults
-        Its faults; may be changed at any time.
+        Faults of the box; may be changed at any time.
 
     Raises
     ------
     UsageError
-        For options or faults that are not known.
+        For unknown options or faults.
     """
 
     def __init__(self, settings: EmulatorSettings) -> None:
@@ -71,16 +71,16 @@ class RdtEmulator(DeviceEmulator):
         self._seen: Counter[Fault] = Counter()
         self._now_s = 0.0
         self._next: int | None = None
-        """Number of the sensor's sample that is sent next; None: it is not sampling."""
+        """Number of the sensor sample that is sent next; None: the box is not sampling."""
         self._left = 0
-        """Records that are still to be sent; 0: until it is stopped."""
+        """Number of records still to be sent; 0: unlimited, until stopped."""
         self._sequence = 1
         self._held: bytes | None = None
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
-        """Take one datagram of the host; return as `poll`.
+        """Process one datagram from the host; return the same as `poll`.
 
-        Times do not go back: an earlier one counts as the latest.
+        Time never goes back: a time before the latest counts as the latest.
         """
         sent = self.poll(now_s)
         assert isinstance(piece, bytes)
@@ -96,7 +96,7 @@ class RdtEmulator(DeviceEmulator):
         return sent
 
     def poll(self, now_s: float) -> list[Sent]:
-        """Go on to `now_s`; return the datagrams that are due by then, each with its time."""
+        """Advance to `now_s`; return the datagrams due until then, each with its time [s]."""
         self._now_s = max(self._now_s, now_s)
         sent: list[Sent] = []
         while self._next is not None and self._next / SENSOR_RATE_HZ <= self._now_s:
@@ -104,7 +104,7 @@ class RdtEmulator(DeviceEmulator):
         return sent
 
     def next_s(self) -> float:
-        """Return the time of the next record; infinite while the box does not send."""
+        """Return the time of the next record [s]; infinite while the box does not send."""
         return math.inf if self._next is None else self._next / SENSOR_RATE_HZ
 
     def _one(self, sample: int) -> list[Sent]:
@@ -125,7 +125,7 @@ class RdtEmulator(DeviceEmulator):
         return sent + self._ended(at_s) if self._left == 0 else sent
 
     def _ended(self, at_s: float) -> list[Sent]:
-        """Stop sending; return a datagram that is still under way."""
+        """Stop sending; return a datagram that was delayed by a fault, if any."""
         self._next = None
         return self._released(at_s)
 
@@ -134,7 +134,7 @@ class RdtEmulator(DeviceEmulator):
         return [] if held is None else [(at_s, held)]
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
-        """Return the datagrams that arrive after one was sent, in the order of arrival."""
+        """Return the datagrams that arrive when a datagram is sent, in the order of arrival."""
         dropped, doubled, late = (
             fault_concerns(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
         )
