@@ -1,4 +1,4 @@
-"""``tactbench choose``: the leaderboard with columns that show which sensors meet given requirements."""
+"""``tactbench choose``: the leaderboard with one column for each requirement: met, missed or unknown."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def command(
     if not found:
         raise UsageError(
             f"There are no results of the task {task.name} under the protocol {protocol} in {own}.",
-            hint=f"Make some: `tactbench run --task {task.name} --protocol {protocol}`.",
+            hint=f"Compute them: `tactbench run --task {task.name} --protocol {protocol}`.",
         )
     specs = {one.name: one.spec for one in registry.sensors}
     table = build_table(found, questions={task.name: task.question})

@@ -1,4 +1,4 @@
-"""``tactbench report``: the results as one page, with figures and the published numbers beside ours."""
+"""``tactbench report``: writes the results as one HTML page, with figures and published scores beside ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``tactbench run``: acquisition, evaluation and ranking."""
+"""``tactbench run``: acquires recordings, evaluates the cells of a matrix and ranks them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from tactbench.core.tables.text import command_line, cut
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
     click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
     click.option("--include-incomplete", is_flag=True,
-                 help="Let recordings take part that lack more than their rig file allows."),
+                 help="Include recordings with more missing samples than their rig file allows."),
     SIMULATION,
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
                  show_default=True,
@@ -47,7 +47,7 @@ from tactbench.core.tables.text import command_line, cut
     click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
                  help="Memory limit per cell and per recording, beside shared libraries. Default: none."),
     click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
-                 help="Folder of a copy of the data sets; what is not there is fetched."),
+                 help="Folder of a copy of the data sets; missing files are fetched."),
     RESULTS,
     YES,
 )  # fmt: skip
@@ -87,11 +87,11 @@ def command(
 
 
 def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Print a line for every stopped cell with its reason, and the command that shows the details of one."""
+    """Print one line for each stopped cell with its reason, and the command that shows the details of the first."""
     if not rows:
         return
     remark(f"\nStopped: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
-    remark(f"Details of one: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")
+    remark(f"Details of the first: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")

@@ -1,4 +1,4 @@
-"""``tactbench show``: sensors side by side, and anything else field by field."""
+"""``tactbench show``: shows sensors side by side, and other installed components field by field."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _owner(owned: Owned[Any]) -> str:
 
 
 _HIDDEN = ("name", "scenes", "campaigns", "published", "dimensions", "parameters")
-"""Fields of a descriptor that have a table of their own or are not printed; JSON has them."""
+"""Fields of a descriptor that are printed as separate tables or not at all; JSON output has them."""
 
 
 def _page(owned: Owned[Any]) -> None:
@@ -83,7 +83,7 @@ _OF_SCENES = ("role", "scenes", "indenter", "places", "force up to", "slides at"
 
 
 def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
-    """Return a line for the scenes of each role and duration."""
+    """Return one table line for all scenes with the same role and duration."""
     from tactbench.core.leaderboard.names import grouped
 
     lines: list[tuple[str, ...]] = []
