@@ -35,9 +35,9 @@ def command(
     ctx: click.Context, name: str | None, listed: bool, recording: Path | None, rig_file: Path | None,
     root: Path | None, yes: bool, shape: str,
 ) -> None:  # fmt: skip
-    """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
+    """Check that a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
 
-    NAME is one of these, a mapping file, or a plugin, all of whose contents are checked. Without --rig-file no device
+    NAME is that of a component, a mapping file, or a plugin with all its components. Without --rig-file no device
     is opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     from tactbench.core.cli.grid import print_fields, print_records

@@ -61,4 +61,4 @@ def command(
         click.echo(json_array(table), nl=False)
     else:
         show([grid.compact() for grid in grids(table, View(columns=COLUMNS))])
-    remark(f"\nFrom {origin}.")
+    remark(f"\nSource: {origin}.")

@@ -33,7 +33,7 @@ from tactbench.core.spec.matrix import REPLICATES
 def command(
     twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **options_given: Any
 ) -> None:
-    """Measure what accuracy costs in time, and draw it.
+    """Measure scores against times for varied settings, and draw the figure.
 
     One setting after another is varied: trees, window, sampling rate, training sessions, estimators; with --twin the
     solver (rung) and the tolerance of the simulation. Files are written into the folder cost of the result folder;

@@ -24,7 +24,7 @@ def command(shape: str) -> None:
         try:
             source = one.source
         except ConfigError as error:
-            remark(f"{name} cannot be used: {error}")
+            remark(f"The data set {name} cannot be used: {error}")
             continue
         records.append(
             {
@@ -36,4 +36,4 @@ def command(shape: str) -> None:
         )  # fmt: skip
     shown = ("name", "sensor", "measured", "task", "MB", "licence", "citation", "cached", "needs")
     print_records(records, shape, title="data sets", columns=shown)
-    remark(f"Kept in {cache()}")
+    remark(f"Folder of fetched data sets: {cache()}")

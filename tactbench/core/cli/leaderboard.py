@@ -104,4 +104,4 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     try:
         replace_file(to, content)
     except OSError as error:
-        raise UsageError(f"{to} cannot be written: {error.strerror or error}.", hint="Give another --to.") from error
+        raise UsageError(f"{to} cannot be written: {error.strerror or error}.", hint="Give another file.") from error

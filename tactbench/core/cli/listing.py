@@ -22,7 +22,7 @@ FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "ind
 @format_option("table", "json")
 @click.pass_context
 def command(ctx: click.Context, family: str | None, shape: str) -> None:
-    """List what is installed.
+    """List the installed components and plugins.
 
     Devices are force sensors and motors. `plugins` lists installed plugins, with the reason if one could not be used;
     the exit code is then 1.

@@ -29,7 +29,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
     click.echo(out)
-    remark(f"Show it: {command_line('tactbench', 'leaderboard', str(out))}")
+    remark(f"Show the table: {command_line('tactbench', 'leaderboard', str(out))}")
     ctx.exit(1 if merged.left_out else 0)
 
 

@@ -58,8 +58,8 @@ def command(
 ) -> None:
     """Acquire, evaluate and rank.
 
-    Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
-    holds already is reused.
+    Without options: the whole of benchmarks.yaml. Options select from this file or replace its choices. Finished cells
+    in the result folder are reused.
     """
     from tactbench.core.cli.listing import remark_failed
     from tactbench.core.leaderboard.formats import write_tables
@@ -78,8 +78,8 @@ def command(
     remark(f"\n{count - outcome.computed} of {count} answers were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
     if store.superseded:
-        remark(f"{len(store.superseded)} of them supersede answers of the same names from other recordings: tables "
-               "show the latest. Another --out DIR keeps both.")  # fmt: skip
+        remark(f"{len(store.superseded)} answers supersede those of the same cells from other recordings: tables "
+               "show the latest answers. Another --out DIR keeps both.")  # fmt: skip
     remark(f"Files: {store.folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     remark(f"Next: {command_line('tactbench', 'report', str(store.folder))}")
     remark_stopped(outcome.failures, store.folder)
@@ -90,7 +90,7 @@ def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
     """Print one line for each stopped cell with its reason, and the command that shows the details of the first."""
     if not rows:
         return
-    remark(f"\nStopped: {len(rows)}.")
+    remark(f"\nStopped cells: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
               help="Show every parameter of a sensor and its source.")  # fmt: skip
 @format_option("table", "json")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (Table I and data sheets), or details of other things that are installed."""
+    """Show sensors side by side (Table I and data sheets), or details of other installed components."""
     from tactbench.core.errors import UnknownNameError
     from tactbench.core.plugins.registry import load_registry, plain
 
@@ -110,4 +110,4 @@ def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
     shown = [sensor_table(title, sensors, rows, with_source=everything) for title, rows in tables.items() if rows]
     print_tables(shown)
     if not everything:
-        click.echo("Every parameter with its source: --all.")
+        click.echo("Give --all to show every parameter with its source.")

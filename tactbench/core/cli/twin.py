@@ -76,8 +76,8 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
             scores[name] = task_score(registry, rig_name, sensor_name, task_name, variant, display)
     if shape == "table":
         remark(
-            "change: what leaving out an included effect changes, estimated; for an effect left out the upper bound of "
-            "what including it would change; 0: exactly nothing."
+            "change: estimated change if an included effect were left out; for an effect left out, the upper bound of "
+            "the change if the effect were included; 0: exactly none."
         )
         table = [{"effects": name, **row} for name, row in scores.items()]
         print_records(table, shape, title="Score with the effects chosen and with all of them (SIM)", columns=_SCORES)
@@ -118,7 +118,7 @@ def verify(ctx: click.Context, shape: str) -> None:
     kinds = ["" if verdict.met else "failed" for verdict in found]
     print_records(list(map(_record, found)), shape, title=rig, kinds=kinds)
     met = sum(verdict.met for verdict in found)
-    remark(f"{met} of {len(found)} within their bounds.")
+    remark(f"{met} of {len(found)} comparisons are within their bounds.")
     ctx.exit(0 if met == len(found) else 1)
 
 

@@ -48,7 +48,7 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
 
 
 def _facts(found: StoredCell) -> dict[str, Any]:
-    """Return the row of the first replicate, with whether a run would reuse it and the reasons if not."""
+    """Return the row of the first replicate, with the reasons, if any, why a run would not reuse the result."""
     from tactbench.core.report.cells import recording_scores
 
     row = found.row

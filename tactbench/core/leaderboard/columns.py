@@ -60,7 +60,7 @@ def _range(row: Row) -> str:
 
 
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
-"""Names for programs of the columns whose text depends on the other rows of the block."""
+"""Columns whose text depends on the other rows of the block, with their names for programs."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
     "estimator": Column("estimator", answer_name),

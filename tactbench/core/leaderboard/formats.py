@@ -36,7 +36,7 @@ _LONG = 12
 
 
 def latex(table: Table, view: View) -> str:
-    """Return the blocks as LaTeX tables of one column's width; those of events and probes span both columns."""
+    """Return the blocks as LaTeX tables one column wide; tables of events and probes span both columns."""
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
     parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
@@ -134,7 +134,7 @@ def write_tables(table: Table, folder: Path) -> None:
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
 """Keys and types of a row's rank in its block."""
 _KEYS = (*JSON_KEYS, *OF_REPLICATES)
-"""Keys of a table's records, without those of the ranks."""
+"""Keys of a table's records, without the keys of the ranks."""
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:

@@ -1,4 +1,4 @@
-"""Leakage probe: scores compared with those of shuffled rows, of first frames alone and of trivial answers."""
+"""Leakage probe: scores compared with scores from shuffled rows, first frames alone and trivial answers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Construction of the leaderboard object that is rendered in every format.
 
-Rows that may be compared stand in one block, and ranks are within a block. Rows under different tasks, protocols or
-splits, and rows from the twin and from hardware, are not comparable. A table depends on its rows, not on their order.
+Comparable rows are in one block, and ranks are within a block. Rows under different tasks, protocols or
+splits, or from simulation and hardware, are not comparable. A table depends on its rows, not on their order.
 Control characters in its texts are escaped (`text.visible`); formats escape their own syntax.
 """
 

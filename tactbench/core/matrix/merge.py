@@ -47,12 +47,12 @@ SEED_DECIDES = (
 
 @dataclass(frozen=True)
 class Merged:
-    """Summary of a merge: rows, number of recordings, and cells left out."""
+    """Summary of a merge: rows, number of recordings, and files left out."""
 
     rows: tuple[Row, ...]
     recordings: int
     left_out: tuple[str, ...]
-    """One sentence for each cell that could not be read."""
+    """One sentence for each file of a cell that could not be read."""
 
 
 def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | None = None) -> Merged:

@@ -154,7 +154,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
 def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
     """Return all combinations (protocol, split) of the chosen protocols and splits.
 
-    UsageError is raised if no combination is compatible; an incompatible one among others becomes a skipped row.
+    UsageError is raised if no combination is compatible; otherwise incompatible combinations become skipped rows.
     """
     for name in choice.protocol:
         if without_options(name) not in task.protocols and not is_probe(name):

@@ -231,7 +231,7 @@ def _from_replay(
     RecordingError is raised if there is no such sensor.
     """
     if not paths:
-        raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
+        raise MissingRecordingError("No recordings were found.", hint="Import recordings with `tactbench import`.")
     scenes: dict[str, dict[Path, str | None]] = {}
     broken: dict[str, BaseException] = {}
     for path in paths:

@@ -79,7 +79,7 @@ def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplet
 
 
 _last: list[Any] = []
-"""Task, recordings, states of their files, `include_incomplete`, and the dataset made of these last."""
+"""The last dataset with its origin: [task, recordings, states of the files, `include_incomplete`, dataset]."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]

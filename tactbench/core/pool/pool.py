@@ -214,7 +214,7 @@ class _Child:
     def _crashed(self) -> Crashed:
         code = self._process.exitcode or 0
         if code >= 0:
-            text = f"The process ended with exit code {code} and without a result."
+            text = f"The process ended with exit code {code} and gave no result."
             return Crashed(text, hint="A plugin may have called os._exit or closed a file of the process.")
         name = next((one.name for one in signal.Signals if one == -code), "unknown")
         hint = "See the last lines of its log."
@@ -271,7 +271,7 @@ _preload = ["tactbench.core.pool.child"]
 
 
 def preload(*modules: str) -> None:
-    """Add `modules` to those that the fork server imports when the first child process is started."""
+    """Add `modules` to the modules that the fork server imports when the first child process is started."""
     _preload.extend(name for name in modules if name not in _preload)
 
 

@@ -97,7 +97,7 @@ def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
     change: dict[str, Any] = {"rig": matrix.rig or simulated}
     over: dict[str, Any] = {}
     if study.dataset and (study.recordings or study.rig_file or study.rig not in (None, replays)):
-        raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings, --rig-file.")
+        raise UsageError("--dataset replaces all recordings.", hint="Leave out --rig, --recordings and --rig-file.")
     if study.rig or study.recordings or study.rig_file or study.dataset:
         file = load_yaml(study.rig_file, RigFile) if study.rig_file else None
         change["rig"] = study.rig or (file.rig if file else replays)

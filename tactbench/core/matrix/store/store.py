@@ -56,7 +56,7 @@ class Store(Index):
         try:
             if try_lock(lock) is False:
                 raise FolderError(
-                    f"The result folder {self.folder} is in use by another run.",
+                    f"Another run is using the result folder {self.folder}.",
                     hint="Wait until that run ends, or give another folder with --out DIR.",
                 )
             with writing(self.folder):

@@ -146,7 +146,7 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
             if "test" in stored:
                 panels.setdefault(row["sensor"], Panel(results.replicate(row), stored))
             else:
-                remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run the cell again.")
+                remark(f"{row['cell']} is not drawn: cells/{row['key']}.h5 cannot be read. Run the cell again.")
         if panels:
             found.append(Group(results, task, tuple(panels.values())))
     return found
