@@ -208,7 +208,7 @@ class _Child:
             text = f"Stopped after the time limit of {timeout_s:g} s."
             return TimedOut(text, hint="Give a larger --timeout SECONDS.")
         if memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb:
-            return OutOfMemory(f"Stopped above the memory limit of {memory_mb} MB.", hint="Give a larger --memory MB.")
+            return OutOfMemory(f"Stopped: it used more than {memory_mb} MB of memory.", hint="Give a larger --memory.")
         return None
 
     def _crashed(self) -> Crashed:
