@@ -25,8 +25,8 @@ def command(
 ) -> None:  # fmt: skip
     """Find the sensors that meet given requirements, and show which requirements are missed or unknown.
 
-    FOLDER is what `run --out` wrote. Default: tactbench-results, or the results that came with tactbench if that folder
-    has none of the task.
+    FOLDER is that of `run --out`. Default: tactbench-results, or the results installed with tactbench if this folder
+    has no results of the task.
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import json_array

@@ -1,4 +1,4 @@
-"""``tactbench compare A B``: two sensors, estimators, protocols, splits or result folders."""
+"""``tactbench compare A B``: compares two sensors, estimators, protocols, splits or result folders."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def _show_knobs(
     sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
-    """Measure the settings of an estimator, or of the simulation; print and write the results."""
+    """Measure scores and times with varied settings of an estimator or the simulation; print and write the results."""
     from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
     from tactbench.core.errors import UsageError

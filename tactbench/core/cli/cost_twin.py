@@ -1,4 +1,4 @@
-"""``tactbench cost --twin``: a simulated rig's error against its seconds per recording."""
+"""``tactbench cost --twin``: measures the error of a simulated rig against its seconds per recording."""
 
 from __future__ import annotations
 

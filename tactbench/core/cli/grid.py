@@ -1,4 +1,4 @@
-"""Output of verbs: tables and records for people as text, Markdown or LaTeX, for programs as JSON or CSV."""
+"""Output of tables and records on stdout: as text, Markdown or LaTeX for people, as JSON or CSV for programs."""
 
 from __future__ import annotations
 

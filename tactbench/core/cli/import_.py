@@ -1,4 +1,4 @@
-"""``tactbench import``: conversion of foreign tables and logs of devices into recordings."""
+"""``tactbench import``: converts foreign tables and logs of devices into recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``tactbench leaderboard``: the table of a result folder, on a terminal or in a file."""
+"""``tactbench leaderboard``: prints or writes the ranked table of the results in a folder."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
+    """Show the table of all results in a folder, in any format. FOLDER is that of `run --out`."""
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import SUFFIXES
     from tactbench.core.leaderboard.view import View, known_columns
@@ -59,7 +59,7 @@ def command(
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
-    """Return the rows that pass the filters; raises UsageError for an unknown name, or where no row is left."""
+    """Return the rows that pass all filters; raises UsageError for an unknown name, or if no row is left."""
     from tactbench.core.errors import UnknownNameError, UsageError
 
     kept = rows

@@ -26,7 +26,7 @@ BAR = 8
 
 
 class StreamState:
-    """The newest samples of one stream, and counts of its rows.
+    """State of a stream during a recording: its newest samples, and counts of its rows.
 
     One thread calls :meth:`take`; another may read the attributes meanwhile, since each is replaced as a whole.
 

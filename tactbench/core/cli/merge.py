@@ -34,7 +34,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 
 
 def _write_tables(merged: Path) -> None:
-    """Write the tables of the leaderboard into a merged folder."""
+    """Write ``leaderboard.md``, ``.csv`` and ``.json`` into a merged result folder."""
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.matrix.store import Store
     from tactbench.core.study.results import shown_rows, table_of

@@ -56,7 +56,7 @@ from tactbench.core.tables.text import command_line, cut
 def command(
     ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **options_given: Any
 ) -> None:
-    """Acquire, evaluate and rank.
+    """Acquire recordings, evaluate sensors and estimators on tasks, and rank the results.
 
     Without options: the whole of benchmarks.yaml. Options select from this file or replace its choices. Finished cells
     in the result folder are reused.

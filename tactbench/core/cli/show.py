@@ -52,7 +52,7 @@ _HIDDEN = ("name", "scenes", "campaigns", "published", "dimensions", "parameters
 
 
 def _page(owned: Owned[Any]) -> None:
-    """Print the fields of a descriptor, and its scenes or parameters as a table."""
+    """Print the fields of an installed component, and its scenes or parameters as a table."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
     from tactbench.core.spec.rig import TaskDescriptor
     from tactbench.core.spec.row import lower_is_better

@@ -35,7 +35,7 @@ class PairwiseComparison:
 
     kind: Kind
     first: str
-    """Name of the first sensor, estimator, protocol, split or folder."""
+    """Name of the first of the compared sensors, estimators, protocols, splits or folders."""
     second: str
     first_row: Row | None
     second_row: Row | None

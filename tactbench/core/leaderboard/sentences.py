@@ -47,7 +47,7 @@ class Board:
     """Answers that are no better than the trivial answer of their sensor."""
     trivial: Sequence[Row]
     stopped: Sequence[Row]
-    """Cells without a score."""
+    """Rows of cells without a score: failed, stopped or skipped."""
     bars: Bars
 
     @property

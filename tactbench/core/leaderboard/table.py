@@ -55,20 +55,20 @@ class Block:
     """Origin of the rows: simulated, emulated or measured."""
     lines: tuple[Line, ...]
     verdict: tuple[str, ...] = ()
-    """At most two sentences on the result."""
+    """At most two sentences above the table, on the outcome of the comparison."""
     notes: tuple[Note, ...] = ()
-    """At most five notes on marks and numbers."""
+    """At most five notes below the table, on marks and numbers."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A leaderboard, ready to be shown."""
+    """A leaderboard of blocks of comparable rows, with sentences and notes, for output in any format."""
 
     blocks: tuple[Block, ...]
     sections: tuple[TextTable, ...] = ()
     """Tables below the blocks: event detection and leakage probes."""
     provenance: tuple[Row, ...] = ()
-    """Versions, machine and commit of the runs."""
+    """Software versions, machine and commit of each run with rows in the table."""
 
     @property
     def lines(self) -> list[Line]:

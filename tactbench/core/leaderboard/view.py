@@ -30,7 +30,7 @@ class View:
     wide: bool = False
     """True to print all columns."""
     columns: tuple[str, ...] = ()
-    """Columns to print instead of the default ones; see `known_columns`."""
+    """Names of the columns to print instead of the default columns; see `known_columns`."""
 
 
 DEFAULT_VIEW = View()

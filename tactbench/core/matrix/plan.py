@@ -47,7 +47,7 @@ class Cell:
     timed: bool = True
     """True if fit time and latency are measured, with no other cell running; by default for the first replicate."""
     simulation: Simulation = _AS_PLANNED
-    """Settings of a simulated rig."""
+    """Settings of the simulation, if the rig is simulated."""
     include_incomplete: bool = False
     """True to include incomplete recordings in the evaluation."""
     declared_task: str = ""

@@ -89,7 +89,7 @@ class Outcome:
 
     rows: tuple[Row, ...]
     computed: int
-    """Number of cells computed in this run; the others were reused."""
+    """Number of cells computed in this run; all other cells were reused."""
     recorded: int
     """Number of recordings made in this run."""
 
@@ -294,7 +294,7 @@ class Run:
     def _ended(
         self, cell: Cell, task: TaskSpec, outcome: Any, key: str = "", sections: Sections | None = None, log: str = ""
     ) -> None:
-        """Store the result of a cell, or the error that stopped it."""
+        """Store the result of a cell, or the error that stopped the cell."""
         if isinstance(outcome, BaseException):
             row, answers = unanswered(cell, task, outcome, simulated=self.registry.rigs[cell.rig].simulated), None
         else:

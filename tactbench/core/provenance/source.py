@@ -70,7 +70,7 @@ def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
 
 @lru_cache(maxsize=64)
 def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
-    """Return the versions of Python, of `RELEVANT` and of the distributions `more`."""
+    """Return the versions of Python, numpy, scipy, scikit-learn and the distributions `more`, by name."""
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
     return found | {name: version_of(name) for name in (*RELEVANT, *more)}
 
@@ -123,5 +123,5 @@ def identity_of(value: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _distributions() -> Mapping[str, list[str]]:
-    """Return the distributions that provide each importable package."""
+    """Return the names of the installed distributions that provide each importable package, by package."""
     return importlib.metadata.packages_distributions()

@@ -14,7 +14,7 @@ ABSENT = "-"
 UNKNOWN = "unknown"
 """Text for a property, such as the mass of a device, that no source states."""
 OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
-"""Fields of a data sheet, in the order in which they are shown."""
+"""Fields of a sensor's data sheet, in the order of the table."""
 
 # Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
 _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (

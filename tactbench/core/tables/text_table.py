@@ -35,7 +35,7 @@ class TextTable:
 
     title: str
     columns: tuple[str, ...]
-    """Names of the columns."""
+    """Names of the columns, from left to right."""
     lines: tuple[tuple[str, ...], ...]
     """Texts of each line, one for each column; some may be of the type `Entry`."""
     numeric: frozenset[str] = frozenset()
@@ -47,9 +47,9 @@ class TextTable:
     origin: str = ""
     """Text to the right of the title: origin of the numbers, such as simulated or measured."""
     summary: tuple[str, ...] = ()
-    """Sentences below the title."""
+    """Sentences between the title and the lines of the table."""
     notes: tuple[str, ...] = ()
-    """Sentences below the lines."""
+    """Sentences below the lines of the table."""
     first_to_go: tuple[str, ...] = ()
     """Columns to leave out, in this order, on a terminal that is too narrow even with texts broken at spaces."""
     unbroken: frozenset[str] = frozenset()

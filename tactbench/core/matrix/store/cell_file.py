@@ -60,7 +60,7 @@ class CellFile:
 
 
 def read_cell(path: Path, *, answers: bool = True) -> CellFile:
-    """Read the file of a cell, with or without its answers.
+    """Return the content of a cell's file, with or without its answers.
 
     Raises
     ------

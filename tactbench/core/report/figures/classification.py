@@ -1,4 +1,4 @@
-"""Figures of a classification as in the paper: confusion matrices, and a t-SNE map of the test set."""
+"""Figures of classification results as in the paper: confusion matrices, and t-SNE maps of the test set."""
 
 from __future__ import annotations
 

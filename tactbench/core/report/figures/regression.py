@@ -1,4 +1,4 @@
-"""Figures of a regression as in the paper: predictions against time and against the target."""
+"""Figures of regression results as in the paper: predictions against time and against the target."""
 
 from __future__ import annotations
 
