@@ -1,4 +1,4 @@
-"""The command line: one verb per file, each imported only when it is called."""
+"""The command line: one module for each command (verb), imported only when the command is called."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VERBS = {
     "list": ("listing", "List sensors, rigs, tasks, estimators, effects and plugins."),
     "show": ("show", "Show sensors side by side, or details of anything else."),
     "record": ("record", "Record one scene into one file."),
-    "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
+    "inspect": ("inspect", "Show the contents of a recording, and check its health."),
     "import": ("import_", "Convert foreign tables, or a sensor's log, into recordings."),
     "datasets": ("datasets", "List public data sets that a run can name."),
     "leaderboard": ("leaderboard", "Print the table of all results in a folder, in any format."),
@@ -32,7 +32,7 @@ VERBS = {
     "cost": ("cost", "Measure what accuracy costs in time."),
     "sensitivity": ("sensitivity", "Show which assumptions simulated scores rest on."),
     "choose": ("choose", "Find the sensor that meets given requirements."),
-    "why": ("why", "Show what a score rests on and how a cell ended; compute it again."),
+    "why": ("why", "Show the data behind a cell's score and its status; compute it again."),
     "merge": ("merge", "Merge result folders; refuse those that contradict each other."),
     "twin": ("twin", "Explain and verify the simulated rig."),
     "new": ("new", "Create a plugin package: a sensor, rig, task, estimator or effect."),
@@ -41,14 +41,14 @@ VERBS = {
 
 
 class LazyGroup(click.Group):
-    """A group that knows its verbs by name and imports one when it is called."""
+    """A command group that lists its verbs by name and imports a verb when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which they are used, then contributed ones."""
+        """Return the names of the verbs in the order of typical use, then those that plugins contribute."""
         return [*VERBS, *contributed("tactbench.verbs")]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the verb; raises UnknownNameError with the nearest name."""
+        """Import and return a verb; None for an option. Raises UnknownNameError, with the nearest name, for others."""
         if cmd_name.startswith("-"):
             return None
         if cmd_name in VERBS:
@@ -62,7 +62,7 @@ class LazyGroup(click.Group):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of verbs; contributed ones alone are imported."""
+        """Write the list of verbs with their help; only verbs of plugins are imported for it."""
         rows = [(name, text) for name, (_, text) in VERBS.items()]
         rows += [(name, verb.load().short_help) for name, verb in contributed("tactbench.verbs").items()]
         with formatter.section("Commands"):
@@ -79,7 +79,7 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted (128 + signal)."""
+    """Run the command line and exit: 0 success, 1 a cell or check failed, 2 wrong usage, 130 Ctrl-C (128 + signal)."""
     # Imports create thousands of lasting objects: with the default thresholds a sixth of their time is collection.
     gc.set_threshold(100_000, 50, 100)
     keep_threads()
@@ -104,7 +104,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _open_streams() -> None:
-    """Open closed streams on the null device and escape text that is no UTF-8, so that printing never fails."""
+    """Open closed standard streams on the null device and escape unprintable text, so that printing never fails."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:  # else a file that is opened later gets this number, and printed text
             stream = open(os.devnull, "w" if number else "r", errors="backslashreplace")  # noqa: PTH123, SIM115
@@ -115,9 +115,9 @@ def _open_streams() -> None:
 
 
 _KEPT = dict.fromkeys(
-    ("run", "sensitivity", "cost"), "What was finished is kept; the same command goes on from there."
+    ("run", "sensitivity", "cost"), "Finished cells are kept; the same command continues from there."
 ) | {"emulate": "The emulated devices and their links are gone."}
-"""Message for an interrupted verb."""
+"""Additional message when a verb is interrupted with Ctrl-C, by verb."""
 
 
 def _interrupted(arguments: list[str] | None, error: BaseException) -> int:

@@ -1,4 +1,4 @@
-"""``tactbench check``: whether a plugin keeps what plugins promise."""
+"""``tactbench check``: checks that a plugin conforms to the rules for plugins."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 @click.command(name="check")
 @click.argument("name", required=False)
-@click.option("--list", "listed", is_flag=True, help="List the checks: the kinds they are for, and their purpose.")
+@click.option("--list", "listed", is_flag=True, help="List the checks with their purpose and kinds of plugins.")
 @click.option("--recording", type=_FILE, metavar="FILE", help="Also check this recording of the sensor.")
 @click.option("--rig-file", type=_FILE, metavar="FILE",
-              help="Also open the device's line, or press with the rig, as this file says; prompts first.")  # fmt: skip
+              help="Also open the device's line, or press with the rig, by this rig file; prompts first.")  # fmt: skip
 @click.option("--root", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
-              help="Folder that holds the files of a data set; without it those that were fetched.")  # fmt: skip
+              help="Folder with the files of a data set. Default: the files fetched before.")  # fmt: skip
 @YES
 @format_option("table", "json")
 @click.pass_context
@@ -35,9 +35,9 @@ def command(
     ctx: click.Context, name: str | None, listed: bool, recording: Path | None, rig_file: Path | None,
     root: Path | None, yes: bool, shape: str,
 ) -> None:  # fmt: skip
-    """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
+    """Check that a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
 
-    NAME is one of these, a mapping file, or a plugin, all of whose contents are checked. Without --rig-file no device
+    NAME is that of a component, a mapping file, or a plugin with all its components. Without --rig-file no device
     is opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     from tactbench.core.cli.grid import print_fields, print_records
@@ -56,7 +56,7 @@ def command(
         print_records(checks, shape, title="checks", columns=("check", "of", "why"))
         return
     if name is None:
-        raise UsageError("No NAME was given.", hint="`tactbench list plugins` shows the names.")
+        raise UsageError("No NAME of a plugin was given.", hint="`tactbench list plugins` shows the names.")
     registry = load_registry()
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
     try:
@@ -71,7 +71,7 @@ def command(
     if recording is not None:
         modes.append("recording")
         if not wrong and all(one.kind != "sensor" for one in subjects):
-            raise UsageError(f"{name} is no sensor.", hint="--recording is for sensors.")
+            raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
     if rig_file is not None:
         modes.append("invasive")
         _confirm(subjects, load_rig_file(rig_file, registry), yes)
@@ -101,10 +101,10 @@ def _confirm(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise UsageError("--rig-file prompts before anything moves, and stdin is no terminal.",
-                         hint="Add --yes if the rig is clear.")  # fmt: skip
+        raise UsageError("--rig-file needs a confirmation before anything moves, and stdin is no terminal.",
+                         hint="Run it in a terminal, or add --yes if the rig is clear.")  # fmt: skip
     click.confirm(
-        f"The lines of the devices and sensors that are checked are opened; a rig that is checked presses a sensor "
+        f"Checking opens the communication lines of devices and sensors; a rig presses a sensor "
         f"twice to {REAL_N:g} N. Is the rig clear?", abort=True, err=True,
     )  # fmt: skip
 
@@ -119,7 +119,7 @@ def _plain(report: CheckReport) -> dict[str, object]:
 
 
 def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
-    """Yield the failed checks, and the skipped ones grouped by their reason."""
+    """Yield (label, text) of each failed check, and of the skipped checks grouped by their reason."""
     for one in report.failed:
         yield "FAILED", f"{one.check}: {one.where}: {one.text}"
         if one.advice:

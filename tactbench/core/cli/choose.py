@@ -1,4 +1,4 @@
-"""``tactbench choose``: the leaderboard with columns that show which sensors meet given requirements."""
+"""``tactbench choose``: the leaderboard with one column for each requirement: met, missed or unknown."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def command(
 ) -> None:  # fmt: skip
     """Find the sensors that meet given requirements, and show which requirements are missed or unknown.
 
-    FOLDER is what `run --out` wrote. Default: tactbench-results, or the results that came with tactbench if that folder
-    has none of the task.
+    FOLDER is that of `run --out`. Default: tactbench-results, or the results installed with tactbench if this folder
+    has no results of the task.
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import json_array
@@ -52,7 +52,7 @@ def command(
     if not found:
         raise UsageError(
             f"There are no results of the task {task.name} under the protocol {protocol} in {own}.",
-            hint=f"Make some: `tactbench run --task {task.name} --protocol {protocol}`.",
+            hint=f"Compute them: `tactbench run --task {task.name} --protocol {protocol}`.",
         )
     specs = {one.name: one.spec for one in registry.sensors}
     table = build_table(found, questions={task.name: task.question})
@@ -61,4 +61,4 @@ def command(
         click.echo(json_array(table), nl=False)
     else:
         show([grid.compact() for grid in grids(table, View(columns=COLUMNS))])
-    remark(f"\nFrom {origin}.")
+    remark(f"\nSource: {origin}.")

@@ -1,4 +1,4 @@
-"""``tactbench compare A B``: two sensors, estimators, protocols, splits or result folders."""
+"""``tactbench compare A B``: compares two sensors, estimators, protocols, splits or result folders."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tactbench.core.cli.options import RESULTS, format_option
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
 @RESULTS
-@click.option("--task", metavar="NAME", help="This task only.")
+@click.option("--task", metavar="NAME", help="Compare results of this task only.")
 @click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
 @format_option("table", "json", "md", "latex", "csv")
 def command(first: str, second: str, out: Path, task: str | None, config: str | None, shape: str) -> None:
     """Compare A and B replicate by replicate: two sensors, estimators, protocols, splits, or result folders.
 
-    Of two folders the same cells are compared: before and after a change, or two laboratories.
+    With two folders, cells of the same name are compared: before and after a change, or of two laboratories.
     """
     from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.leaderboard.pairwise import (

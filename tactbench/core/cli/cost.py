@@ -1,4 +1,4 @@
-"""``tactbench cost``: what accuracy costs in time, of estimators or of the simulated rig."""
+"""``tactbench cost``: the time that accuracy costs, for estimators or for the simulated rig."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.spec.matrix import REPLICATES
 @click.command(name="cost")
 @options(
     click.option("--twin", is_flag=True,
-                 help="Of the simulated rig instead: score against seconds, or without --task its error."),
+                 help="Measure the simulated rig instead: score against seconds, or without --task its error."),
     click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; with --twin repeatable."),
     click.option("--task", metavar="NAME", help="Task."),
     click.option("--estimator", "estimators", multiple=True, metavar="NAME",
@@ -25,7 +25,7 @@ from tactbench.core.spec.matrix import REPLICATES
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
                  help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
     click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
-                 help="Number of timing rounds of --twin without --task."),
+                 help="Number of timing rounds, for --twin without --task."),
     JOBS,
     RESULTS,
 )  # fmt: skip
@@ -33,25 +33,25 @@ from tactbench.core.spec.matrix import REPLICATES
 def command(
     twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **options_given: Any
 ) -> None:
-    """Measure what accuracy costs in time, and draw it.
+    """Measure scores against times for varied settings, and draw the figure.
 
     One setting after another is varied: trees, window, sampling rate, training sessions, estimators; with --twin the
-    rung and the tolerance of the simulation. Files are written into the folder cost of the result folder, whose
-    finished cells are reused.
+    solver (rung) and the tolerance of the simulation. Files are written into the folder cost of the result folder;
+    finished cells there are reused.
     """
     from tactbench.core.errors import UsageError
 
     if twin and task is None:
         if any(options_given.values()):
-            raise UsageError("--twin without --task takes --sensor and --rounds.", hint="Leave the others out.")
+            raise UsageError("--twin without --task takes --sensor and --rounds only.", hint="Leave the others out.")
         from tactbench.core.cli.cost_twin import show_twin
 
         show_twin(sensors, out / "cost", shape, rounds)
         return
     if task is None or (len(sensors) != 1 and not twin):
         raise UsageError(
-            "A sensor and a task are expected, or --twin.",
-            hint="Of estimators: --sensor NAME --task NAME, one of each. Of the simulated rig: --twin.",
+            "One sensor and one task are expected, or --twin.",
+            hint="For estimators, give --sensor NAME --task NAME, each once; for the simulated rig, give --twin.",
         )
     _show_knobs(sensors, task, twin, out / "cost", shape, **options_given)
 
@@ -60,7 +60,7 @@ def _show_knobs(
     sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
-    """Measure the settings of an estimator, or of the simulation; print and write the results."""
+    """Measure scores and times with varied settings of an estimator or the simulation; print and write the results."""
     from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
     from tactbench.core.errors import UsageError
@@ -77,7 +77,7 @@ def _show_knobs(
     spec = registry.tasks[task].spec
     rig = registry.rigs[registry.first_rig("simulated" if recordings is None else "replays")]
     if twin and not rig.rungs:
-        raise UsageError(f"The rig {rig.name!r} has no rungs.", hint="Leave out --recordings.")
+        raise UsageError(f"The rig {rig.name!r} has no solvers of different accuracy.", hint="Leave out --recordings.")
     # As `run` has it: the paper's protocol needs the paper's three roles.
     protocol = protocol or (spec.protocols[0] if recordings is None else "deployable")
     names = estimators or ((quick_estimator(registry, task),) if twin else spec.estimators[:1])

@@ -1,4 +1,4 @@
-"""``tactbench cost --twin``: a simulated rig's error against its seconds per recording."""
+"""``tactbench cost --twin``: measures the error of a simulated rig against its seconds per recording."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 _COLUMNS = (
     "sensor", "observable", "marks", "way", "rung", "seconds", "error_rms", "error_worst", "unit", "noise", "reason",
 )  # fmt: skip
-"""Keys of a record that tables show."""
+"""Keys of a record that are columns of the printed table."""
 
 
 def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> None:
-    """Measure the simulated rig for `sensors` (default: the matrix's); print `shape`, write files into `out`.
+    """Measure the simulated rig for `sensors` (default: the matrix's); print in format `shape`, write files into `out`.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
     name = registry.first_rig("simulated")
     where = registry.rigs[name].work_precision
     if where is None:
-        raise UsageError(f"The rig {name!r} declares no study of what its accuracy costs.", hint="Use the rig twin.")
+        raise UsageError(f"The rig {name!r} declares no study of its accuracy against time.", hint="Use the rig twin.")
     found: list[CostPoint | Skipped] = []
     with progress() as display:
         for sensor in sensors or matrix_called().sensors:
@@ -61,7 +61,7 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
 
 
 def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[dict[str, Any]]:
-    """Return every point as a flat record with its time, its error and its settings."""
+    """Return one flat record for each point, with its time, error and settings, and for each skipped setting."""
     from tactbench.core.cost.precision import diagrams, precise
 
     found = []

@@ -1,4 +1,4 @@
-"""``tactbench datasets``: public data that a run can name."""
+"""``tactbench datasets``: the list of public data sets that ``run --dataset`` accepts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tactbench.core.cli.options import format_option
 @click.command(name="datasets")
 @format_option(*GRID_FORMATS)
 def command(shape: str) -> None:
-    """List public data sets: what was measured, size, licence, citation, and whether it is here already.
+    """List public data sets: quantity measured, size, licence, citation, and whether the data are on this machine.
 
-    `tactbench run --dataset NAME` fetches what is missing, once. One that is not public in this form needs --root.
+    `tactbench run --dataset NAME` fetches missing files, once. A data set that cannot be fetched needs --root.
     """
     from tactbench.core.errors import ConfigError
     from tactbench.core.recording.datasets import cache, datasets
@@ -24,7 +24,7 @@ def command(shape: str) -> None:
         try:
             source = one.source
         except ConfigError as error:
-            remark(f"{name} cannot be used: {error}")
+            remark(f"The data set {name} cannot be used: {error}")
             continue
         records.append(
             {
@@ -36,4 +36,4 @@ def command(shape: str) -> None:
         )  # fmt: skip
     shown = ("name", "sensor", "measured", "task", "MB", "licence", "citation", "cached", "needs")
     print_records(records, shape, title="data sets", columns=shown)
-    remark(f"Kept in {cache()}")
+    remark(f"Folder of fetched data sets: {cache()}")

@@ -1,4 +1,4 @@
-"""Output of verbs: tables and records for people as text, Markdown or LaTeX, for programs as JSON or CSV."""
+"""Output of tables and records on stdout: as text, Markdown or LaTeX for people, as JSON or CSV for programs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
 
 
 def print_fields(fields: Sequence[tuple[str, str]]) -> None:
-    """Print names and values on stdout, a field a line; long values are broken at spaces of the terminal's width."""
+    """Print (name, value) pairs on stdout, one line for each; long values are wrapped to the terminal's width."""
     from tactbench.core.tables.terminal import WITHOUT_EDGE
 
     left = max((len(name) for name, _ in fields), default=0) + 2
@@ -50,13 +50,13 @@ def print_records(
     records: Sequence[Mapping[str, Any]], shape: str, *, title: str = "", columns: Sequence[str] = (),
     kinds: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Print records on stdout as ``json``, ``csv`` or ``table``; their keys are those of the first.
+    """Print records on stdout as ``json``, ``csv`` or ``table``; the keys of the first record apply to all.
 
     Parameters
     ----------
     title, columns, kinds
-        Of a table: its title; the keys that it shows (default: all), but for those without any entry; and one word a
-        record, by which it looks, see `tactbench.core.tables.terminal`.
+        For a table: its title; the keys shown as columns (default: all), empty columns left out; and one word for each
+        record that selects the style of its line, see `tactbench.core.tables.terminal`.
     """
     from tactbench.core.tables.csv_text import csv_text
 

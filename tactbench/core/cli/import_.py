@@ -1,4 +1,4 @@
-"""``tactbench import``: conversion of foreign tables and logs of devices into recordings."""
+"""``tactbench import``: converts foreign tables and logs of devices into recordings."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from tactbench.core.recording.mapping import ImportReport
 
 MOST_NAMED = 12
-"""Largest number of findings that are printed, the worst first."""
+"""Largest number of findings, and of files left out, that are printed; the most severe findings come first."""
 PAIRS = "KEY=VALUE"
 
 
 @click.command(name="import")
 @click.argument("source", metavar="MAPPING|LOG", type=click.Path(path_type=Path))
 @click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of the data set. Default: that of the mapping.")  # fmt: skip
+              help="Folder of the data set. Default: the one stated in the mapping.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR|FILE",
-              help="Output folder; of a log, the output file. Default: recordings/NAME[.h5].")  # fmt: skip
-@click.option("--replace", is_flag=True, help="Overwrite recordings that hold something else.")
+              help="Output folder; for a log, the output file. Default: recordings/NAME[.h5].")  # fmt: skip
+@click.option("--replace", is_flag=True, help="Overwrite existing recordings with other content.")
 @click.option("--sensor", metavar="NAME", help="Read a log of this sensor's own tools.")
 @click.option(
     "--option", "options", multiple=True, metavar=PAIRS, help="Option of the log's reader: board=14; repeatable."
@@ -40,8 +40,8 @@ def command(
 ) -> None:  # fmt: skip
     """Convert foreign tables, as described by MAPPING (a YAML file), or with --sensor a LOG, into recordings.
 
-    All of them are written, or none. Values marked as "no sample" are counted. See docs/mappings.md. Exit code 1 if
-    `inspect` finds an error in what was written.
+    Either all recordings are written, or none. Values marked as "no sample" are counted. See docs/mappings.md. Exit
+    code 1 if `inspect` finds an error in the recordings.
     """
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.recording.mapping import import_tables
@@ -51,13 +51,13 @@ def command(
 
     if sensor is None:
         if options or labels:
-            raise click.UsageError("--option and --label are for logs: name the --sensor.")
+            raise click.UsageError("--option and --label are for logs: give --sensor as well.")
         target = Path("recordings") / source.stem if out is None else out
         with progress() as display:
             report = import_tables(source, root=root, out=target, progress=display, replace=replace)
     else:
         if root is not None:
-            raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
+            raise click.UsageError("--root is for mappings: leave out either --root or --sensor.")
         target = Path("recordings") / f"{source.stem}.h5" if out is None else out
         own, descriptor = _pairs("--label", labels), load_registry().sensors[sensor]
         session, role = str(own.pop("session", "1")), own.pop("role", None)
@@ -70,7 +70,7 @@ def command(
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
-    """Return ``key=value`` pairs; values are read as YAML reads a number, a truth value or a text."""
+    """Return ``key=value`` options as a dict; values are read as in YAML: a number, a boolean or a text."""
     from tactbench.core.spec.yaml_file import plain_value
 
     found: dict[str, Any] = {}
@@ -83,7 +83,7 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
 
 
 def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield the facts about an import, field by field."""
+    """Yield (name, text) pairs that summarise an import: counts, files left out, findings."""
     stated = {
         "title": report.title, "recordings": len(report.recordings), "in": folder,
         "sensors": tuple(dict.fromkeys(one.meta.sensor.name for one in report.recordings)),

@@ -1,4 +1,4 @@
-"""``tactbench inspect``: the contents of recordings, and checks of their health."""
+"""``tactbench inspect``: shows the contents of recordings and checks their health."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
 _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
-"""Fields of the meta that the screen shows in another form, or not at all; JSON has them."""
+"""Fields of a recording's metadata that the terminal shows in another form or not at all; JSON output has them."""
 
 
 @click.command(name="inspect")
@@ -26,7 +26,7 @@ _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
               help="Convert the one unfinished FILE into the recording OUT.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool, rescue: Path | None) -> None:
-    """Show what is in recordings: streams, channels, rates, and whether they are healthy.
+    """Show the contents of recordings (streams, channels, rates), and check their health.
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
@@ -51,7 +51,7 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
 
 def describe(recording: Recording) -> dict[str, Any]:
-    """Return all facts about an open recording as plain data, without its samples."""
+    """Return the metadata, streams and findings of an open recording as plain data, without its samples."""
     from dataclasses import asdict
 
     from tactbench.core.recording.health import examine
@@ -92,7 +92,7 @@ def _print(about: dict[str, Any]) -> None:
     meta = about["meta"]
     effects = {taken: [one["effect"] + " (forced)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
                for taken in (True, False)}  # fmt: skip
-    verified = "verified" if about["complete"] else "unfinished: this is what a crash left behind"
+    verified = "verified" if about["complete"] else "unfinished: an interrupted or running recording"
     stated: dict[str, Any] = {
         "file": about["file"], "sensor": about["sensor"],
         **{name: value for name, value in meta.items() if name not in _STRUCTURES},
@@ -115,7 +115,7 @@ def _print(about: dict[str, Any]) -> None:
 
 
 def _clock(clock: dict[str, Any]) -> dict[str, Any]:
-    """Return the fit of a device's clock to the host's, and its errors; JSON has each line of the fit."""
+    """Return the summary of the fit of a device's clock to the host's; JSON output has every segment of the fit."""
     lines = clock["segments"]
     drift = max((line["drift"] * 1e6 for line in lines), key=abs, default=None)
     error_us = max((line["bound_ns"] * 1e-3 for line in lines if line["bound_ns"] is not None), default=None)

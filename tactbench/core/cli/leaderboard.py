@@ -1,4 +1,4 @@
-"""``tactbench leaderboard``: the table of a result folder, on a terminal or in a file."""
+"""``tactbench leaderboard``: prints or writes the ranked table of the results in a folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
 FOR_PEOPLE = ("table", "md", "latex")
-"""Formats whose columns can be selected."""
+"""Output formats for which --columns can be given."""
 
 
 @click.command(name="leaderboard")
@@ -27,11 +27,11 @@ FOR_PEOPLE = ("table", "md", "latex")
     *(click.option(f"--{key}", multiple=True, metavar="NAME", help=f"Only this {key}; may be repeated.")
       for key in ("sensor", "task", "protocol", "split", "estimator")),
     click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
-                 help="Only the first N answers of each sensor in each block. Default of N: 1."),
-    click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell."),
+                 help="Show only the N best answers of each sensor in each block. Default of N: 1."),
+    click.option("--columns", metavar="A,B,…", help="Columns to show, for example sensor,score,cell."),
     click.option("--wide", is_flag=True, help="All columns."),
     click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
-                 help="Output format. Default: table, or that of the suffix of the file given with --to."),
+                 help="Output format. Default: table, or the format of the suffix of --to."),
     click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
                  help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx."),
 )  # fmt: skip
@@ -39,7 +39,7 @@ def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
+    """Show the table of all results in a folder, in any format. FOLDER is that of `run --out`."""
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import SUFFIXES
     from tactbench.core.leaderboard.view import View, known_columns
@@ -48,8 +48,8 @@ def command(
 
     shape = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
     if shape is None:
-        raise UsageError(f"The suffix of {to} names no format.",
-                         hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
+        raise UsageError(f"The suffix of {to} is not that of a table format.",
+                         hint=f"Give a file that ends in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
     if columns is not None and shape not in FOR_PEOPLE:
         raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
     view = View(wide, known_columns(columns.split(",") if columns is not None else ()))
@@ -59,7 +59,7 @@ def command(
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
-    """Return the rows that pass the filters; raises UsageError for an unknown name, or where no row is left."""
+    """Return the rows that pass all filters; raises UsageError for an unknown name, or if no row is left."""
     from tactbench.core.errors import UnknownNameError, UsageError
 
     kept = rows
@@ -71,7 +71,7 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
         kept = [row for row in kept if not chosen or row[key] in chosen]
     if not kept:
         raise UsageError(
-            "No row passes all filters.", hint="Leave one out; `tactbench leaderboard --columns cell` names all rows."
+            "No row passes all filters.", hint="Leave one filter out; `tactbench leaderboard --columns cell` lists all."
         )
     return kept
 
@@ -82,7 +82,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     Parameters
     ----------
     shape
-        One of `TABLE_FORMATS`; of a file also ``parquet`` or ``xlsx``.
+        Format: one of `TABLE_FORMATS`; for a file also ``parquet`` or ``xlsx``.
 
     Raises
     ------

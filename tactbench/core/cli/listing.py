@@ -1,4 +1,4 @@
-"""``tactbench list``: everything that is installed, and the plugins that could not be loaded."""
+"""``tactbench list``: lists the installed sensors, tasks, estimators and so on, and plugins that failed to load."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "ind
 @format_option("table", "json")
 @click.pass_context
 def command(ctx: click.Context, family: str | None, shape: str) -> None:
-    """List what is installed.
+    """List the installed components and plugins.
 
-    Devices are force sensors and motors. `plugins` lists installed plugins, and the reasons why some could not be used;
+    Devices are force sensors and motors. `plugins` lists installed plugins, with the reason if one could not be used;
     the exit code is then 1.
     """
     from tactbench.core.plugins.registry import load_registry
@@ -66,7 +66,7 @@ def _plugins(registry: Registry, shape: str) -> None:
 
 
 def remark_failed(registry: Registry) -> None:
-    """Print on stderr which plugins could not be loaded, if any."""
+    """Print the names of plugins that could not be loaded, if any, on stderr."""
     from tactbench.core.tables.terminal import remark
 
     if registry.failures or registry.refused:

@@ -20,28 +20,28 @@ if TYPE_CHECKING:
     from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 SILENT_S = 2.0
-"""Seconds without a block after which a stream is called silent."""
+"""Seconds without data after which a stream is reported as silent."""
 BAR = 8
-"""Characters of the longest bar of a taxel."""
+"""Length of the longest bar drawn for a taxel [characters]."""
 
 
 class StreamState:
-    """The newest samples of one stream, and counts of its rows.
+    """State of a stream during a recording: its newest samples, and counts of its rows.
 
-    One thread calls :meth:`take`; another may read the attributes meanwhile: each is replaced as a whole.
+    One thread calls :meth:`take`; another may read the attributes meanwhile, since each is replaced as a whole.
 
     Attributes
     ----------
     rows, bad, lost
         Rows received; rows with a missing, suspect or saturated sample; rows missing by the device's sequence numbers.
     first, latest
-        (channels,) the first and the newest sample of each channel that was not missing; NaN before.
+        (channels,) first and newest sample of each channel that was not missing, in the channel's unit; NaN if none.
     span_ns
-        Times of the first and the newest row.
+        Times of the first and the newest row [ns].
     rate_hz
-        Mean rate since the first row.
+        Mean rate since the first row [Hz].
     seen_s
-        Time of the newest block [s of `time.monotonic`].
+        Arrival time of the newest block of rows [s of `time.monotonic`].
     """
 
     def __init__(self, spec: StreamSpec) -> None:
@@ -56,7 +56,7 @@ class StreamState:
         self._first_number: int | None = None
 
     def take(self, block: Block) -> None:
-        """Add a block: count its rows and keep its newest samples."""
+        """Count the rows of a block of samples, and keep its newest samples."""
         import numpy as np
 
         if not len(block.data):
@@ -83,15 +83,15 @@ class StreamState:
         self.seen_s = time.monotonic()
 
     def values(self) -> Iterator[tuple[ChannelSpec, float, float]]:
-        """Yield the channels with their first and their newest sample."""
+        """Yield each channel with its first and its newest sample."""
         if self.latest is not None:
             yield from zip(self.spec.channels, self.first.tolist(), self.latest.tolist(), strict=True)
 
 
 class LiveView:
-    """Shows on stderr what is being recorded, from when the rig knows its streams to the end of the ``with`` block.
+    """Live view, on stderr, of a recording in progress, from the start of its streams to the end of the ``with`` block.
 
-    :meth:`begin` and :meth:`watch` are for `acquire`. rich draws in a thread of its own, so that a slow terminal delays
+    `acquire` calls :meth:`begin` and :meth:`watch`. A separate thread draws, so that a slow terminal delays
     no recording.
     """
 
@@ -112,23 +112,23 @@ class LiveView:
                 redirect_stdout=False, redirect_stderr=False,
             )  # fmt: skip
         else:
-            remark("stderr is no terminal that --live can draw on: nothing is shown.")
+            remark("stderr is not a terminal that --live can draw on: no live view is shown.")
 
     def begin(self, acquisition: Acquisition) -> None:
-        """Begin to draw."""
+        """Start drawing the streams of `acquisition`."""
         self._reference = acquisition.reference
         self._states = {spec.name: StreamState(spec) for spec in (*acquisition.streams, *acquisition.reference)}
         if self._live is not None:
             self._live.start()
 
     def watch(self, block: Block) -> None:
-        """Take the newest samples of a block; no reference to it is kept."""
+        """Copy the newest samples of a block; no reference to the block is kept."""
         if block.stream in self._states:
             self._states[block.stream].take(block)
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Return a context in which a prompt has the terminal."""
+        """Return a context in which drawing is suspended, so that a prompt can use the terminal."""
         live = self._live if self._live is not None and self._live.is_started else None
         if live is not None:
             live.stop()
@@ -142,14 +142,14 @@ class LiveView:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the terminal as it was, and the last picture on it."""
+        """Restore the terminal, and print the last state of the view on it."""
         if self._live is not None and self._states:
             self._live.stop()
             self._ended = True
             self._console.print(self.picture())
 
     def picture(self) -> RenderableType:
-        """Return the picture of this moment; lines for which the terminal has no room are cut off below."""
+        """Return the view of the present state; lines beyond the height of the terminal are cut off."""
         from rich.columns import Columns
         from rich.console import Group
         from rich.text import Text
@@ -170,7 +170,7 @@ class LiveView:
         return Group(*parts)
 
     def _course(self) -> str:
-        """Return the time since the first sample, and the force of the reference beside that of the profile."""
+        """Return the text with the time since the first sample, and the measured and the planned force [N]."""
         import numpy as np
 
         from tactbench.core.spec import units
@@ -191,7 +191,7 @@ class LiveView:
         return f"{elapsed_s:.1f} of {duration_s:.1f} s, force {force} N, wanted {wanted_n:.2f} N"
 
     def _counts(self) -> Iterator[Text]:
-        """Yield a line for each stream, red where it is silent, or rows are lost or bad."""
+        """Yield one line of counts for each stream, in red if the stream is silent or has lost or bad rows."""
         from rich.text import Text
 
         for name, state in self._states.items():
@@ -204,7 +204,7 @@ class LiveView:
 
 
 def _taxel(channel: ChannelSpec, change: float, full: float) -> Text:
-    """Return name, change and bar of a taxel; the change rises under load where the channel's sign is known."""
+    """Return the name, change and bar of a taxel; the change is signed so that load raises it, if the sign is known."""
     from rich.text import Text
 
     change *= channel.sign or 1

@@ -1,4 +1,4 @@
-"""``tactbench merge``: the result folders of several machines become one."""
+"""``tactbench merge``: merges the result folders of several machines into one folder."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from tactbench.core.tables.text import command_line
               help="The merged folder; it must not exist yet.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
-    """Make one result folder of several: the same in whatever order, however often.
+    """Merge several result folders into one; the order of the folders, and repeated folders, make no difference.
 
-    Replicates of other seeds join those that are there. Folders that contradict each other are refused, and the cells
-    are named. Where two hosts have finished one cell with the same scores, one host's row is kept whole: times of
+    Replicates with other seeds are added. Folders that contradict each other are refused, and the cells in question
+    are listed. If two hosts have finished a cell with the same scores, one host's row is kept whole: times of
     different hosts are never mixed.
     """
     from tactbench.core.matrix.merge import merge
@@ -29,12 +29,12 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
     click.echo(out)
-    remark(f"Show it: {command_line('tactbench', 'leaderboard', str(out))}")
+    remark(f"Show the table: {command_line('tactbench', 'leaderboard', str(out))}")
     ctx.exit(1 if merged.left_out else 0)
 
 
 def _write_tables(merged: Path) -> None:
-    """Write the tables of the leaderboard into a merged folder."""
+    """Write ``leaderboard.md``, ``.csv`` and ``.json`` into a merged result folder."""
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.matrix.store import Store
     from tactbench.core.study.results import shown_rows, table_of

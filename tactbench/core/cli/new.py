@@ -1,4 +1,4 @@
-"""``tactbench new``: a plugin package to start from."""
+"""``tactbench new``: writes a plugin package to start from."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ NAME = r"[a-z][a-z0-9]*(-[a-z0-9]+)*"
 _OPTIONS = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
             "estimator": "--sensor ideal --task force --estimator", "effect": "--sensor ideal --task force --effects",
             "sensor": "--task contact-location --sensor"}  # fmt: skip
-"""Options of `run` that try a new plugin; its name follows."""
+"""Options of ``tactbench run`` that try a new plugin, by its kind; the name of the plugin is appended."""
 
 
 @click.command(name="new")
 @click.argument("kind", type=click.Choice(KINDS))
 @click.argument("name")
 @click.option("--into", type=click.Path(path_type=Path, file_okay=False), default=Path(), metavar="DIR",
-              help="Folder of the package; made if it is not there. Default: this one.")  # fmt: skip
+              help="Folder of the package; created if missing. Default: the current folder.")  # fmt: skip
 def command(kind: str, name: str, into: Path) -> None:
     """Write an installable package with a plugin that already runs: a sensor, rig, task, estimator or effect.
 
@@ -32,8 +32,8 @@ def command(kind: str, name: str, into: Path) -> None:
 
     if not re.fullmatch(NAME, name) or name == "all":
         raise UsageError(
-            f"{name!r} is no name for a {kind}.",
-            hint=f"Lower-case letters, digits and single hyphens, a letter first, not `all`: my-{kind}, for example.",
+            f"{name!r} is not a valid name for a {kind}.",
+            hint=f"Use lower-case letters, digits and single hyphens, a letter first, not `all`; example: my-{kind}.",
         )
     if name in load_registry().families()[f"{kind}s"]:
         raise UsageError(f"A {kind} called {name} is installed already.", hint="Choose another name.")
@@ -51,7 +51,7 @@ def command(kind: str, name: str, into: Path) -> None:
 
 
 def rendered(kind: str, name: str) -> dict[str, str]:
-    """Return the texts of the package's files, by path."""
+    """Return the texts of the files of a new plugin package, by path."""
     from tactbench.core.plugins.hookspecs import API_VERSION
 
     module = f"tactbench_{name.replace('-', '_')}"

@@ -1,4 +1,4 @@
-"""Options that several verbs have."""
+"""Command-line options that several verbs share."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Command = Callable[..., Any]
 
 
 class FiniteRange(click.FloatRange):
-    """A range of finite numbers: click alone accepts NaN in every range."""
+    """Option type for a range of finite numbers; `click.FloatRange` alone would accept NaN."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number; fails with a usage error."""
+        """Return `value` as a number; raise a usage error if it is not finite or out of range."""
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value} is no finite number.", param, ctx)
+            self.fail(f"{value} is not a finite number.", param, ctx)
         return number
 
 
@@ -28,7 +28,7 @@ ABOVE_0 = FiniteRange(min=0, min_open=True)
 
 
 def options(*several: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Return a decorator that adds options to a verb, in this order in its help."""
+    """Return a decorator that adds options to a verb, listed in the given order in its help."""
 
     def add(command: Command) -> Command:
         for option in reversed(several):
@@ -39,7 +39,7 @@ def options(*several: Callable[[Command], Command]) -> Callable[[Command], Comma
 
 
 def format_option(*shapes: str) -> Callable[[Command], Command]:
-    """Return the option ``--format``, whose value is called `shape`; the first of `shapes` is its default."""
+    """Return the option ``--format`` with the choices `shapes`, the first of which is the default."""
     return click.option("--format", "shape", type=click.Choice(shapes), default=shapes[0], show_default=True,
                         help="Output format.")  # fmt: skip
 
@@ -62,4 +62,4 @@ SIMULATION = options(
         help="Set a nuisance (placement_scatter_mm=0.3), or rung, tolerance or scenario of the simulation; repeatable.",
     ),
 )  # fmt: skip
-"""Options that `tactbench.core.study.simulation.simulation_of` reads."""
+"""Options --effects and --set, for `tactbench.core.study.simulation.simulation_of`."""

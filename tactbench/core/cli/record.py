@@ -1,4 +1,4 @@
-"""``tactbench record``: one scene into one recording."""
+"""``tactbench record``: records one scene into one file."""
 
 from __future__ import annotations
 
@@ -76,17 +76,17 @@ def command(
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
         if out.exists() and read_meta(out).excluded.startswith("interrupted"):
-            remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
+            remark(f"The samples recorded until the interruption are in {out}, which is left out of every evaluation.")
         elif isinstance(error, KeyboardInterrupt):
-            remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
+            remark("\n".join(getattr(error, "__notes__", ())) or "No recording was kept.")
         raise
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {sensor} on {rig}{mark}, {scene.indenter}")
     for name, value in meta.assumptions.items():
         remark(f"  assumed: {name} = {value}")
-    remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")
+    remark(f"See its contents:  {command_line('tactbench', 'inspect', str(out))}")
     if meta.excluded:
-        remark(f"It takes no part in a score unless --include-incomplete is given: {meta.excluded}.")
+        remark(f"This recording is left out of scores unless --include-incomplete is given: {meta.excluded}.")
         click.get_current_context().exit(1)
 
 
@@ -98,7 +98,7 @@ def _built(registry: Registry, name: str, devices: RigFile | None, operator: Ope
     rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]
     if not hasattr(rig, "open"):
         raise UsageError(
-            f"The rig {name!r} cannot record: it hands out recordings that exist already.",
-            hint="Use --rig twin, or another rig that presses.",
+            f"The rig {name!r} cannot record: it only replays recordings that exist already.",
+            hint="Use --rig twin, or another rig that records.",
         )
     return rig

@@ -1,4 +1,4 @@
-"""``tactbench report``: the results as one page, with figures and the published numbers beside ours."""
+"""``tactbench report``: writes the results as one HTML page, with figures and published scores beside ours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.cli.options import DEFAULT_FOLDER
               help="Folder of page and figures. Default: FOLDER/report.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, folder: Path, out: Path | None) -> None:
-    """Write one page of all results in FOLDER (what `run --out` wrote), and print published numbers beside ours."""
+    """Write one HTML page of all results in FOLDER (that of `run --out`), and print published scores beside ours."""
     from tactbench.core.cli.grid import print_tables
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.page import make_report

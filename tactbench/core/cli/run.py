@@ -1,4 +1,4 @@
-"""``tactbench run``: acquisition, evaluation and ranking."""
+"""``tactbench run``: acquires recordings, evaluates the cells of a matrix and ranks them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from tactbench.core.tables.text import command_line, cut
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
     click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
     click.option("--include-incomplete", is_flag=True,
-                 help="Let recordings take part that lack more than their rig file allows."),
+                 help="Include recordings with more missing samples than their rig file allows."),
     SIMULATION,
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
                  show_default=True,
@@ -47,7 +47,7 @@ from tactbench.core.tables.text import command_line, cut
     click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
                  help="Memory limit per cell and per recording, beside shared libraries. Default: none."),
     click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
-                 help="Folder of a copy of the data sets; what is not there is fetched."),
+                 help="Folder of a copy of the data sets; missing files are fetched."),
     RESULTS,
     YES,
 )  # fmt: skip
@@ -56,10 +56,10 @@ from tactbench.core.tables.text import command_line, cut
 def command(
     ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **options_given: Any
 ) -> None:
-    """Acquire, evaluate and rank.
+    """Acquire recordings, evaluate sensors and estimators on tasks, and rank the results.
 
-    Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
-    holds already is reused.
+    Without options: the whole of benchmarks.yaml. Options select from this file or replace its choices. Finished cells
+    in the result folder are reused.
     """
     from tactbench.core.cli.listing import remark_failed
     from tactbench.core.leaderboard.formats import write_tables
@@ -78,8 +78,8 @@ def command(
     remark(f"\n{count - outcome.computed} of {count} answers were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
     if store.superseded:
-        remark(f"{len(store.superseded)} of them supersede answers of the same names from other recordings: tables "
-               "show the latest. Another --out DIR keeps both.")  # fmt: skip
+        remark(f"{len(store.superseded)} answers supersede those of the same cells from other recordings: tables "
+               "show the latest answers. Another --out DIR keeps both.")  # fmt: skip
     remark(f"Files: {store.folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     remark(f"Next: {command_line('tactbench', 'report', str(store.folder))}")
     remark_stopped(outcome.failures, store.folder)
@@ -87,11 +87,11 @@ def command(
 
 
 def remark_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Print a line for every stopped cell with its reason, and the command that shows the details of one."""
+    """Print one line for each stopped cell with its reason, and the command that shows the details of the first."""
     if not rows:
         return
-    remark(f"\nStopped: {len(rows)}.")
+    remark(f"\nStopped cells: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), 200)
         remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
-    remark(f"Details of one: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")
+    remark(f"Details of the first: {command_line('tactbench', 'why', str(rows[0]['cell']), '--out', str(folder))}")

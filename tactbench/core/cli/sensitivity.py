@@ -1,4 +1,4 @@
-"""``tactbench sensitivity``: which assumptions of the simulation a score rests on."""
+"""``tactbench sensitivity``: shows how scores depend on the assumptions of the simulation."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def command(
     ctx: click.Context, /, estimator: tuple[str, ...], nuisances: tuple[str, ...], settings: tuple[str, ...],
     shape: str, out: Path, **options_given: Any,
 ) -> None:  # fmt: skip
-    """Show what simulated scores and the order of sensors rest on.
+    """Show how simulated scores and the order of sensors depend on assumptions.
 
-    Every nuisance is set to both ends of its range, and those that cost the most are set in pairs, on the same seeds.
-    What the result folder holds already is reused; each set of ends is a folder in its folder assumptions.
+    Every nuisance is set to both ends of its range, and the most influential nuisances in pairs, on the same seeds.
+    Finished cells are reused; each combination of ends has its own folder in OUT/assumptions.
     """
     from tactbench.core.cli.grid import print_tables
     from tactbench.core.leaderboard.sensitivity import sensitivity_tables

@@ -1,4 +1,4 @@
-"""``tactbench show``: sensors side by side, and anything else field by field."""
+"""``tactbench show``: shows sensors side by side, and other installed components field by field."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
               help="Show every parameter of a sensor and its source.")  # fmt: skip
 @format_option("table", "json")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (Table I and data sheets), or details of other things that are installed."""
+    """Show sensors side by side (Table I and data sheets), or details of other installed components."""
     from tactbench.core.errors import UnknownNameError
     from tactbench.core.plugins.registry import load_registry, plain
 
@@ -48,11 +48,11 @@ def _owner(owned: Owned[Any]) -> str:
 
 
 _HIDDEN = ("name", "scenes", "campaigns", "published", "dimensions", "parameters")
-"""Fields of a descriptor that have a table of their own or are not printed; JSON has them."""
+"""Fields of a descriptor that are printed as separate tables or not at all; JSON output has them."""
 
 
 def _page(owned: Owned[Any]) -> None:
-    """Print the fields of a descriptor, and its scenes or parameters as a table."""
+    """Print the fields of an installed component, and its scenes or parameters as a table."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
     from tactbench.core.spec.rig import TaskDescriptor
     from tactbench.core.spec.row import lower_is_better
@@ -83,7 +83,7 @@ _OF_SCENES = ("role", "scenes", "indenter", "places", "force up to", "slides at"
 
 
 def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
-    """Return a line for the scenes of each role and duration."""
+    """Return one table line for all scenes with the same role and duration."""
     from tactbench.core.leaderboard.names import grouped
 
     lines: list[tuple[str, ...]] = []
@@ -110,4 +110,4 @@ def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
     shown = [sensor_table(title, sensors, rows, with_source=everything) for title, rows in tables.items() if rows]
     print_tables(shown)
     if not everything:
-        click.echo("Every parameter with its source: --all.")
+        click.echo("Give --all to show every parameter with its source.")

@@ -1,4 +1,4 @@
-"""``tactbench twin``: the simulated rig's plan of effects, and its comparison with laws and closed forms."""
+"""``tactbench twin``: shows the effects that the simulated rig includes, and verifies it against closed forms."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def command() -> None:
 @click.option("--sensor", "sensor_name", required=True, metavar="NAME", help="Sensor.")
 @click.option("--task", "task_name", required=True, metavar="NAME", help="Task whose scenes are planned.")
 @click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
-              help="Recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
+              help="Number of recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
 @EFFECTS
 @format_option("table", "json", "csv")
 def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, shape: str) -> None:
-    """Show which effects a task's scenes are simulated with, which are left out, the reasons, and what each costs.
+    """Show the effects that are included or left out in simulating a task's scenes, with reasons and cost.
 
     The last table has the task's score with the effects chosen and with all of them.
     """
@@ -50,11 +50,11 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
     sensor = registry.sensors[sensor_name]
     rig: Explaining = load_object(registry.rigs[rig_name].where)(rig_context(registry))
     if not hasattr(rig, "explain"):
-        raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Use the rig twin.")
+        raise UsageError(f"The rig {rig_name!r} cannot list the effects that it includes.", hint="Use the rig twin.")
     scenes = [planned.scene.simulated_as(simulation) for planned in registry.tasks[task_name].spec.scenes]
     if not scenes:
         raise UsageError(
-            f"Task {task_name!r} plans no scenes: only recordings made elsewhere can answer it.",
+            f"Task {task_name!r} has no scenes to simulate: it is evaluated on recordings made elsewhere.",
             hint="Choose another task; see `tactbench list tasks`.",
         )
     groups = grouped(scenes, lambda scene: tuple(
@@ -76,8 +76,8 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
             scores[name] = task_score(registry, rig_name, sensor_name, task_name, variant, display)
     if shape == "table":
         remark(
-            "change: what leaving out an included effect changes, estimated; for an effect left out the upper bound of "
-            "what including it would change; 0: exactly nothing."
+            "change: estimated change if an included effect were left out; for an effect left out, the upper bound of "
+            "the change if the effect were included; 0: exactly none."
         )
         table = [{"effects": name, **row} for name, row in scores.items()]
         print_records(table, shape, title="Score with the effects chosen and with all of them (SIM)", columns=_SCORES)
@@ -100,9 +100,9 @@ def _effect(row: Explained) -> dict[str, Any]:
 @format_option("table", "json", "csv")
 @click.pass_context
 def verify(ctx: click.Context, shape: str) -> None:
-    """Compare the simulation with laws and closed forms.
+    """Compare the simulation with physical laws and closed forms.
 
-    Exit code 1 if it misses one.
+    Exit code 1 if a comparison is outside its bound.
     """
     from tactbench.core.cli.grid import print_records
     from tactbench.core.errors import UsageError
@@ -113,12 +113,12 @@ def verify(ctx: click.Context, shape: str) -> None:
     rig = registry.first_rig("simulated")
     where = registry.rigs[rig].verification
     if where is None:
-        raise UsageError(f"The rig {rig!r} declares no laws to verify.", hint="Use the rig twin.")
+        raise UsageError(f"The rig {rig!r} declares no laws to be verified with.", hint="Use the rig twin.")
     found: list[Verdict] = list(load_object(where)())
     kinds = ["" if verdict.met else "failed" for verdict in found]
     print_records(list(map(_record, found)), shape, title=rig, kinds=kinds)
     met = sum(verdict.met for verdict in found)
-    remark(f"{met} of {len(found)} within their bounds.")
+    remark(f"{met} of {len(found)} comparisons are within their bounds.")
     ctx.exit(0 if met == len(found) else 1)
 
 

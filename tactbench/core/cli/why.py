@@ -1,4 +1,4 @@
-"""``tactbench why``: what a score rests on, how a cell ended, whether it would be reused; its recomputation."""
+"""``tactbench why``: shows the data behind a cell's score, its status and reuse; computes the cell again."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.why import StoredCell
 
 _LINES = 15
-"""Lines of a traceback, log or table that are shown; JSON has all of them."""
+"""Largest number of lines of a traceback, log or table that are printed; JSON output has all lines."""
 _LONGEST = 400
-"""Characters of a value that are shown."""
+"""Largest number of characters of a value that are printed."""
 
 
 @click.command(name="why")
@@ -29,9 +29,9 @@ _LONGEST = 400
 @format_option("text", "json")
 @click.pass_context
 def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -> None:
-    """Show what a cell's score rests on, whether its result would be reused, and how it ended.
+    """Show the data behind a cell's score, its status, and whether its result would be reused.
 
-    CELL is a name as tables show it, or a part of it that only one cell has. Reuse and --again are of the first of its
+    CELL is a name as tables show it, or a unique part of it. Reuse and --again refer to the first of the cell's
     replicates. With --again, simulated recordings are made anew in a temporary folder, and the exit code is 1 if a
     result differs or the cell fails.
     """
@@ -48,7 +48,7 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
 
 
 def _facts(found: StoredCell) -> dict[str, Any]:
-    """Return the row of the first replicate, and whether a run would reuse it."""
+    """Return the row of the first replicate, with the reasons, if any, why a run would not reuse the result."""
     from tactbench.core.report.cells import recording_scores
 
     row = found.row
@@ -63,7 +63,7 @@ def _facts(found: StoredCell) -> dict[str, Any]:
 
 
 def _print(facts: dict[str, Any], found: StoredCell) -> None:
-    """Print the facts, and the details of the cell over all replicates as the report has them."""
+    """Print the facts, and the details of the cell over all replicates, as in the report."""
     from tactbench.core.cli.grid import print_fields, print_tables
     from tactbench.core.report.cells import details
     from tactbench.core.statistics.replicates import over_replicates
@@ -86,7 +86,7 @@ def _print(facts: dict[str, Any], found: StoredCell) -> None:
 
 
 def _again(found: StoredCell) -> dict[str, Any]:
-    """Compute the cell again in this process, and return how it compares."""
+    """Compute the cell again in this process, and return its differences from the stored result."""
     from tactbench.core.study.progress import progress
 
     with redirect_stdout(sys.stderr), progress() as display:  # what a plugin prints is no result

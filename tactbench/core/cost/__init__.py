@@ -1,1 +1,1 @@
-"""Measures what accuracy costs in time, of estimators and of a simulated rig."""
+"""Measurement of the time that accuracy costs, for estimators and for a simulated rig."""

@@ -1,4 +1,4 @@
-"""Varies one setting after another and measures scores and times; each setting is a cell of the matrix."""
+"""Scores and times with one setting varied after another; each setting is evaluated as a cell of a matrix."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ TREES = (3, 10, 30, 100, 300)
 WINDOWS = (0, 2, 5, 10, 20, 40)
 EVERY = (1, 2, 5, 10, 20)
 TOLERANCES = (3.0, 1.0, 0.3)
-"""Settings that are tried. The estimator's and the protocol's own are among them."""
+"""Values tried for each setting (trees, window, every n-th sample, tolerance), defaults included."""
 TIMES = {
     "trees": "answer_delay_ms", "window k": "answer_delay_ms", "every n-th sample": "answer_delay_ms",
     "estimator": "answer_delay_ms", "training sessions": "fit_s", "rung": "sim_s", "tolerance": "sim_s",
 }  # fmt: skip
-"""Time that each knob costs."""
+"""Key of the time that is affected by each varied setting."""
 BOUGHT = ("estimator", "trees", "window k", "every n-th sample")
-"""Knobs whose settings answer the same question about the same recordings: they compete for the front."""
+"""Settings that are evaluated on the same task and recordings, so that their values compete for the front."""
 _KEPT = (
     "score", "ci_low", "ci_high", "protocol", "split", "estimator", "params", "simulation", "status", "reason",
     "n_replicates", "n_train", "n_test", "fit_s", "latency_ms_p50", "answer_delay_ms", "delay_parts_ms", "sim_s",
@@ -43,7 +43,7 @@ Record = dict[str, Any]
 
 
 class Setting(NamedTuple):
-    """One setting of one knob, all others at their defaults."""
+    """One value of one varied setting (`knob`), with all others at their defaults."""
 
     knob: str
     value: str
@@ -54,26 +54,26 @@ class Setting(NamedTuple):
 
     @property
     def choice(self) -> TaskChoice:
-        """The choice of a task; its name is still to be given."""
+        """Task choice with this setting; the name of the task is filled in by the caller."""
         own = () if self.split is None else (self.split,)
         return TaskChoice(name="", protocol=(self.protocol,), split=own, estimators=(self.estimator,))
 
     def is_of(self, row: Row) -> bool:
-        """Return whether a row of this simulation belongs to the setting."""
+        """Return True if a result row is of this setting, given that it is of the same simulation."""
         way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
         wanted = (way, self.estimator.name, dict(self.estimator.params))
         return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
 
 
 def quick_estimator(registry: Registry, task: str) -> str:
-    """Return the name of a linear estimator for `task` that searches no parameters, the task's own before others.
+    """Return the name of a linear estimator for `task` without parameter search, preferably one of the task's own.
 
-    Where there is none, the first of these estimators.
+    If there is no such estimator, return the first estimator for the task.
 
     Raises
     ------
     UsageError
-        If no estimator for this kind of question is installed, trivial ones aside.
+        If no estimator for this kind of task is installed, except for trivial ones.
     """
     spec = registry.tasks[task].spec
     fitting = [registry.estimators[name] for name in spec.estimators]
@@ -84,7 +84,7 @@ def quick_estimator(registry: Registry, task: str) -> str:
 
 
 def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, progress: Progress) -> Row:
-    """Record every scene of `task` by `simulation` in a temporary folder and return the row of a quick estimator."""
+    """Simulate every scene of `task` in a temporary folder and return the result row of a quick estimator."""
     estimator = quick_estimator(registry, task)
     choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
     matrix = MatrixSpec(
@@ -96,7 +96,7 @@ def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation:
 
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
-    """Yield the settings of the first of `estimators`, and all of them with their defaults."""
+    """Yield the settings varied for the first of `estimators`, and each of `estimators` with its defaults."""
     first = estimators[0]
     plain = EstimatorChoice(name=first.name)
     own = first.params.get("n_estimators")
@@ -118,7 +118,7 @@ def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], proto
 
 
 def simulations_of(rig: RigDescriptor, estimator: EstimatorDescriptor, protocol: str) -> Iterator[Setting]:
-    """Yield the settings of a simulated rig: its rungs except for the dearest, and tolerances."""
+    """Yield the settings of a simulated rig: its solvers (rungs) except for the slowest, and tolerances."""
     plain = EstimatorChoice(name=estimator.name)
     for rung in rig.rungs[:-1]:
         yield Setting("rung", rung, protocol, plain, None, Simulation(rung=rung))
@@ -130,7 +130,7 @@ def measure(
     matrix: MatrixSpec, settings: Sequence[Setting], folder: Path, *, choice: EngineChoice | None = None,
     recordings: Path | None = None, progress: Progress,
 ) -> dict[str, Any]:  # fmt: skip
-    """Answer every setting as cells of a result folder and return their scores and times.
+    """Evaluate every setting as cells of a result folder and return the scores and times.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def measure(
     -------
     dict
         ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``dagger``, ``seed``,
-        ``trivial`` (the score of the best answer that looks at nothing, or None), ``replicates``, and ``settings``: a
+        ``trivial`` (the best score without any input, or None), ``replicates``, and ``settings``: a
         record for each setting, in the order of `settings`.
     """
     task = matrix.tasks[0].name

@@ -1,4 +1,4 @@
-"""Work-precision diagrams: their points by subject, and the front of each."""
+"""Work-precision diagrams: errors against computing times, and the front of the best points."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from tactbench.core.progress import Progress
 
 P = TypeVar("P")
 SHARE = 1 / 3
-"""Share of an observable's noise; a smaller error changes scores little."""
+"""Share of an observable's noise below which an error changes scores little."""
 
 
 def front(points: Sequence[P], cost_of: Callable[[P], tuple[float, float]]) -> list[P]:
-    """Return the points that no other point beats in both time and error, in order of time.
+    """Return the points that no other point beats in both time and error, by increasing time.
 
     Parameters
     ----------
     cost_of
-        Function that returns the time and the error of a point, both the smaller the better.
+        Function that returns the time and the error of a point; smaller is better for both.
     """
     kept: list[P] = []
     for point in sorted(points, key=cost_of):
@@ -30,17 +30,17 @@ def front(points: Sequence[P], cost_of: Callable[[P], tuple[float, float]]) -> l
 
 
 class Skipped(NamedTuple):
-    """A way of simulating that is not possible for a sensor."""
+    """A setting of the simulation that is not possible for a sensor, with the reason."""
 
     subject: str
     label: str
     rung: str
-    """Name of the rung; empty: none."""
+    """Name of the solver (rung); empty: none."""
     reason: str
 
 
 def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[CostPoint | Skipped]:
-    """Carry out the jobs of a study; yield their points, and the reasons of jobs that are not possible."""
+    """Carry out the jobs of a cost study; yield the measured points, and `Skipped` for jobs that are not possible."""
     progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)
@@ -52,7 +52,7 @@ def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[Cos
 
 
 def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoint]]:
-    """Return the points by (subject, observable), those of each diagram in order of their time."""
+    """Return the points of each diagram by (subject, observable), sorted by time."""
     found: dict[tuple[str, str], list[CostPoint]] = {}
     for point in points:
         found.setdefault((point.subject, point.observable), []).append(point)
@@ -60,5 +60,5 @@ def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoin
 
 
 def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
-    """Return the front of one diagram: error against seconds."""
+    """Return the front of a diagram: points that no other beats in both seconds and error."""
     return front(points, lambda point: (point.seconds, point.error))

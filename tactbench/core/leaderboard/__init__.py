@@ -1,1 +1,1 @@
-"""The leaderboard: one table object, and the ways to show it."""
+"""The leaderboard: a table object of ranked results, and its output formats."""

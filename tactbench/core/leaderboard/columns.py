@@ -1,4 +1,4 @@
-"""The columns of a leaderboard, and the texts of a row in them."""
+"""The columns of a leaderboard, and the conversion of result rows into their texts."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, finite
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
-"""Kind of a line: an answer, a trivial answer, a cell that failed, or one that was skipped."""
+"""Kind of a leaderboard line: an answer, a trivial answer, a failed cell or a skipped cell."""
 
 
 class Column(NamedTuple):
-    """A column whose text depends on its row alone."""
+    """A leaderboard column whose text depends on a single result row."""
 
     shown: str
-    """Name of its text for programs: a key of ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
+    """Name of the column for programs: a key of ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
     text: Callable[[Row], str]
     value: Callable[[Row], float | None] | None = None
-    """Number that it is sorted by, times in seconds, intervals by their middle; None for a column of words."""
+    """Number by which the column is sorted: times in s, intervals by their middle; None for a column of words."""
 
 
 def _score(shown: str, key: str) -> Column:
@@ -49,7 +49,7 @@ def _seconds(row: Row, key: str) -> float | None:
 
 
 def _range(row: Row) -> str:
-    """Return the scores of campaigns, or of the units held out, if they are too few for an interval."""
+    """Return the scores of campaigns or held-out units as text, if there are too few of them for an interval."""
     scores, unit = row.get("replicate_scores") or [], row["unit"]
     if len(scores) < 2 or row["ci_low"] is not None:
         return ABSENT
@@ -60,7 +60,7 @@ def _range(row: Row) -> str:
 
 
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
-"""Columns whose text depends on the other rows of the block."""
+"""Columns whose text depends on the other rows of the block, with their names for programs."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
     "estimator": Column("estimator", answer_name),
@@ -85,26 +85,26 @@ OF_ROWS: dict[str, Column] = {
 COLUMNS = ("place", "sensor", "estimator", "score", "notes", *list(OF_ROWS)[3:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
 WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "latency p95")
-"""Columns that are printed only with all others."""
+"""Columns that are printed only if all columns are requested."""
 DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)
 NUMERIC = frozenset(("place", *(name for name, column in OF_ROWS.items() if column.value)))
 
 
 @dataclass(frozen=True)
 class Line:
-    """One row as text."""
+    """One line of a leaderboard: a result row and its texts."""
 
     row: Row = field(repr=False, compare=False)
-    """Row with all digits."""
+    """Result row with unrounded numbers."""
     texts: Mapping[str, str]
-    """Texts by column; numbers are entries."""
+    """Texts by column; numbers are of the type `Entry`."""
     kind: Kind
     placing: Rank | None = None
-    """Rank in its block; None for answers that are no better than the trivial one of their sensor."""
+    """Rank in the block; None for an answer that is no better than the trivial answer of its sensor."""
 
 
 def line_of(row: Row, placing: Rank | None = None, marks: Sequence[str] = (), place: str = "") -> Line:
-    """Return the line of a row; `place` is shown if a finished row has no rank."""
+    """Return the leaderboard line of a result row; the text `place` is shown for a finished row without rank."""
     texts = dict.fromkeys(COLUMNS, "")
     if row["status"] != "done":
         texts |= {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}

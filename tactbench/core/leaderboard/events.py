@@ -1,4 +1,4 @@
-"""A table of detectors of events: misses, latency and false alarms beside their recall area."""
+"""Table of event detectors, such as for slip: misses, latency, false alarms."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _FIGURES = {
     "macro F1": ("frame macro F1", ".2f"),
     "compute [s/s]": ("compute s per s of signal", ".2g"),
 }
-"""Key of the figure and format of each column."""
+"""Key of the figure of merit, and number format, of each column."""
 _NOTE = (
     "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
-    "Slipped: the median displacement from onset to alarm. Compute: seconds a second of signal."
+    "Slipped: the median displacement from onset to alarm. Compute: computing time per second of signal."
 )
 
 
 def events_table(rows: Sequence[Row]) -> TextTable | None:
-    """Return the table of finished rows with figures of events; None if there is no such row."""
+    """Return the table of event detection from the finished rows; None if no row is of an event task."""
     finished = [row for row in rows if row["status"] == "done" and row.get("events")]
     if not finished:
         return None

@@ -1,4 +1,4 @@
-"""The leaderboard in every format; all show the same digits."""
+"""The leaderboard in all output formats, with the same digits in each."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ SUFFIXES = {
     ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
     ".txt": "table",
 }  # fmt: skip
-"""Format of a file by its suffix."""
+"""Output format by suffix of the file."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "against reference", "published")
 _LONG = 12
-"""Largest number of characters of a name that its column in a paper does not break."""
+"""Largest number of characters of a name that is not broken into lines in the LaTeX table."""
 
 
 def latex(table: Table, view: View) -> str:
-    """Return the blocks as LaTeX, each a table for one column of a paper; events and probes go over both columns."""
+    """Return the blocks as LaTeX tables one column wide; tables of events and probes span both columns."""
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
     parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
@@ -45,7 +45,7 @@ def latex(table: Table, view: View) -> str:
 
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
-    """Return a block as LaTeX with the columns `names`, trivial answers below a rule."""
+    """Return a block as a LaTeX table with the columns `names`, trivial answers below a horizontal rule."""
     order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
     lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
@@ -70,14 +70,14 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
 
 
 def _column(name: str, texts: Sequence[str]) -> str:
-    """Return how LaTeX sets a column: long names go on in a further line."""
+    """Return the LaTeX column type for a column: names too long for one line are wrapped."""
     if name not in ("sensor", "estimator", "notes"):
         return "r"
     return r"p{0.23\columnwidth}" if max(map(len, texts)) > _LONG else "l"
 
 
 def _caption(block: Block) -> str:
-    """Return the title of a block, its setting, its origin, and the number of test samples."""
+    """Return the caption of a block: title, metric, protocol, split, origin and number of test samples."""
     counts = sorted({line.row["n_test"] for line in block.lines if line.row["n_test"] is not None})
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
@@ -88,17 +88,17 @@ def _caption(block: Block) -> str:
 
 
 def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
-    """Return a leaderboard in a format that `SUFFIXES` names.
+    """Return a leaderboard as the content of a file in the format `shape`, one of the values of `SUFFIXES`.
 
     Parameters
     ----------
     view, width
-        Printed columns, and the width of a terminal; the formats for programs hold everything.
+        Columns and width [characters] of formats for people; formats for programs hold all columns.
 
     Raises
     ------
     UsageError
-        If the library of Parquet or Excel is not installed.
+        If the library for Parquet or Excel files is not installed.
     """
     if shape in ("parquet", "xlsx"):
         return parquet(table) if shape == "parquet" else xlsx(table)
@@ -119,7 +119,7 @@ def write_tables(table: Table, folder: Path) -> None:
     Raises
     ------
     UsageError
-        If the folder cannot be written; each of the files is then whole, an old one or a new one.
+        If the folder cannot be written; every file is then complete, with the old or the new content.
     """
     try:
         for shape in ("md", "csv", "json"):
@@ -132,13 +132,13 @@ def write_tables(table: Table, folder: Path) -> None:
 
 
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
-"""Keys of the rank of a row in its block, and their types."""
+"""Keys and types of a row's rank in its block."""
 _KEYS = (*JSON_KEYS, *OF_REPLICATES)
-"""Keys of a table's records, before their ranks."""
+"""Keys of a table's records, without the keys of the ranks."""
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
-    """Yield the row of each line with its ranks, and the texts of its columns by their names for programs."""
+    """Yield each line's result row with its ranks, and the texts of its columns by their names for programs."""
     for line in table.lines:
         one = line.placing
         ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
@@ -147,7 +147,7 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
 
 
 def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
-    """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
+    """Return column names and lines for formats with one value in each field; lists and mappings are JSON text."""
     names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
     return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
 
@@ -159,13 +159,13 @@ def _flat(key: str, value: Any) -> Any:
 
 
 def json_array(table: Table) -> str:
-    """Return a table's records as a JSON array, one a line: every key, and the text of its columns in ``shown``."""
+    """Return a table as a JSON array with one line for each record: all keys, and the texts shown in ``shown``."""
     lines = (json_text(values | {"shown": shown}) for values, shown in records(table))
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
 def parquet(table: Table) -> bytes:
-    """Return a table's records as a Parquet file: lists and tables as JSON text, provenance as metadata.
+    """Return a table's records as a Parquet file: lists and mappings as JSON text, provenance as metadata.
 
     Raises
     ------
@@ -194,13 +194,13 @@ def _library(name: str, what: str, extra: str) -> Any:
 
 
 def _kind(name: str) -> type:
-    """Return the type of a column: bool, float, int or str; lists and tables are text."""
+    """Return the type of a Parquet column: bool, float, int or str; lists and mappings are text."""
     types = FORMAT.get(name) or {_RANKS.get(name, str)}
     return next((one for one in (bool, float, int) if one in types), str)
 
 
 def xlsx(table: Table) -> bytes:
-    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of notes.
+    """Return a table's records as an Excel workbook without formulas, with a second sheet of notes.
 
     Raises
     ------

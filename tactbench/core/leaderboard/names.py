@@ -1,4 +1,4 @@
-"""Names of rows, metrics and answers in tables, and the trivial answers that they are compared with."""
+"""Names of sensors, metrics and answers in tables, and the trivial answers to compare answers with."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ _SPLITS = {
     "in-session": "split in-session: each recording cut in time",
     "shuffled": "split shuffled: rows dealt at random",
 }
-"""Descriptions of splits whose name is not that of a group of recordings."""
+"""Descriptions of splits that do not hold out groups of recordings by a label."""
 
 
 def sensor_name(row: Row) -> str:
-    """Return a sensor's name, marked where it was simulated or emulated."""
+    """Return the sensor's name, marked SIM or EMULATED unless it was real."""
     mark = " EMULATED" if row.get("emulated") else " SIM" if row["simulated"] else ""
     return visible(f"{row['sensor']}{mark}")
 
 
 def answer_name(row: Row) -> str:
-    """Return the estimator's name, with the parameters that are not its defaults."""
+    """Return the estimator's name, with the parameters that differ from its defaults."""
     options = ", ".join(f"{key}={value}" for key, value in sorted((row["params"] or {}).items()))
     return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
 
 
 def metric_name(row: Row) -> str:
-    """Return the metric with its unit: ``RMSE [N]``."""
+    """Return the name of the metric with its unit, as ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     name = row["metric"].removeprefix(TRUE)
     true = "true " if name != row["metric"] else ""
@@ -48,34 +48,34 @@ def metric_name(row: Row) -> str:
 
 
 def direction(row: Row) -> str:
-    """Return whether a lower or a higher score is better, as text."""
+    """Return the text "lower is better" or "higher is better" for a row's metric."""
     return f"{'lower' if lower_is_better(row['metric']) else 'higher'} is better"
 
 
 def split_name(split: str) -> str:
-    """Return the description of a split."""
+    """Return a description of a train/test split by its name."""
     return _SPLITS.get(split, f"split {'' if shots(split) else 'by '}{split}")
 
 
 def held_out(row: Row) -> bool:
-    """Return whether the replicates of a row are units that its split holds out, and not campaigns."""
+    """Return True if the replicates of a row are units held out by its split, False for simulated campaigns."""
     return row.get("replicate_unit") not in ("replicate", None)
 
 
 def sign_of(row: Row) -> float:
-    """Return 1 where a lower score is better, else -1; the smaller its product with a score, the better."""
+    """Return 1 if a lower score is better, else -1: a factor by which a score becomes an error."""
     return 1.0 if lower_is_better(row["metric"]) else -1.0
 
 
 def hardware_name(row: Row) -> str:
-    """Return the origin of a row: a simulation, emulated devices on a rig, or a rig."""
+    """Return the origin of a row as text: simulation, emulated devices on a rig, or a real rig."""
     if row.get("emulated"):
         return f"EMULATED (rig {row['rig']})"
     return "SIM" if row["simulated"] else f"rig {row['rig']}"
 
 
 def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_Key, list[_Value]]:
-    """Return the members of each key, both in the order of `members`."""
+    """Return the members by their key; keys and members keep the order of `members`."""
     groups: dict[_Key, list[_Value]] = {}
     for one in members:
         groups.setdefault(key(one), []).append(one)
@@ -83,48 +83,48 @@ def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_K
 
 
 comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
-"""Keys that an answer and the trivial answer it is compared with share."""
+"""Keys of a row that are equal for an answer and the trivial answer to compare it with."""
 WORSE_END = {1.0: "ci_high", -1.0: "ci_low"}
-"""Key of the worse end of an interval, by `sign_of`."""
+"""Key of the worse end of a row's interval, by the value of `sign_of`."""
 
 
 def error_of(row: Row) -> float:
-    """Return the score as a number of which less is better; infinity for a score that is not finite."""
+    """Return the score with a sign such that smaller is better; infinity for a score that is not finite."""
     return sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf
 
 
 class Bars:
-    """The best trivial answer of the sensor of each answer, whatever it looks at."""
+    """Comparison of answers with the best trivial answer for the same sensor, task, rig, protocol and split."""
 
     def __init__(self, rows: Iterable[Row] = ()) -> None:
-        """Collect the finished trivial answers of `rows`; an oracle is none."""
+        """Collect the finished trivial answers among `rows`, except for oracles, which read the reference."""
         trivial = (row for row in rows if row["is_baseline"] and row["status"] == "done")
         groups = grouped((row for row in trivial if row.get("looks_at") != "reference"), comparison_key)
         self._best = {key: min(alike, key=error_of) for key, alike in groups.items()}
         self._unshown: dict[str, bool] = {}
 
     def trivial(self, row: Row) -> Row | None:
-        """Return the trivial answer; None if it is not among the rows."""
+        """Return the row of the trivial answer to compare `row` with; None if it is not among the rows."""
         return self._best.get(comparison_key(row))
 
     def score(self, row: Row) -> float | None:
-        """Return the score of the trivial answer, if need be from the row itself; None if there is none."""
+        """Return the score of the trivial answer, or else the baseline stored in `row`; None if neither exists."""
         trivial = self.trivial(row)
         return row.get("baseline") if trivial is None else trivial["score"]
 
     def name(self, row: Row) -> str:
-        """Return the name of the trivial answer."""
+        """Return the name of the trivial answer to compare `row` with."""
         trivial = self.trivial(row)
         return "the trivial answer" if trivial is None else answer_name(trivial)
 
     def no_better(self, row: Row) -> bool:
-        """Return whether an answer is no better than the trivial one."""
+        """Return True if an answer is no better than the trivial answer."""
         return self._reaches(row, error_of(row))
 
     def unshown(self, row: Row) -> bool:
-        """Return whether the interval of an answer contains the score of the trivial one, or lies beyond it.
+        """Return True if an answer is not shown to be better: its interval includes or exceeds the trivial score.
 
-        On recordings the interval of their paired difference decides, where both were tested on the same units.
+        If both answers were tested on the same recorded units, the interval of their paired difference decides.
         """
         if row["cell"] not in self._unshown:  # a difference takes thousands of exchanges
             self._unshown[row["cell"]] = self._contains(row)

@@ -1,4 +1,4 @@
-"""Two sensors, estimators, protocols, splits or result folders, compared cell by cell."""
+"""Comparison of two sensors, estimators, protocols, splits or result folders, cell by cell."""
 
 from __future__ import annotations
 
@@ -31,45 +31,45 @@ _NAMES: dict[Kind, Callable[[Row], str]] = {
 
 @dataclass(frozen=True)
 class PairwiseComparison:
-    """Two cells that ask the same question, or the reason why they are not compared."""
+    """Comparison of two cells that differ in one respect, or the reason why they cannot be compared."""
 
     kind: Kind
     first: str
-    """Name of the first sensor, estimator, protocol, split or folder."""
+    """Name of the first of the compared sensors, estimators, protocols, splits or folders."""
     second: str
     first_row: Row | None
     second_row: Row | None
     refused: str = ""
-    """Reason why there is no difference; empty if there is one."""
+    """Reason why the cells are not compared; empty if they are."""
     difference: Difference | None = None
     folds: FoldDifference | None = None
-    """Difference over folds whose training data overlap, if there are several."""
+    """Difference over folds with overlapping training data; None for a single fold."""
     p_corrected: float | None = None
-    """p corrected for all comparisons that the matrix declares; None for an exploratory comparison."""
+    """p-value corrected for all comparisons declared in the matrix; None for an exploratory comparison."""
 
     @property
     def row(self) -> Row:
-        """Return one of the rows, for values that both share."""
+        """One of the two rows, for values that are equal in both."""
         return next(row for row in (self.first_row, self.second_row) if row is not None)
 
     @property
     def of(self) -> str:
-        """Return what both rows share: the estimator of two sensors, the sensor of two estimators, else both."""
+        """Name that both rows share: the estimator of two sensors, the sensor of two estimators, else both names."""
         return str(_key(self.kind, self.row)[-1])
 
     @property
     def cells(self) -> frozenset[str]:
-        """The names of both cells."""
+        """Names of the compared cells."""
         return frozenset(str(row["cell"]) for row in (self.first_row, self.second_row) if row is not None)
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
-    """Compare two sensors, estimators, protocols or splits of one leaderboard, wherever the rest of the cells is equal.
+    """Compare the cells of one leaderboard that differ only in two sensors, estimators, protocols or splits.
 
     Raises
     ------
     UnknownNameError
-        If these rows have no such task or name, or the two names are of different kinds.
+        If `rows` lack the task or one of the names, or the two names are of different kinds.
     """
     rows = _in_task(rows, task)
     known = {kind: grouped(rows if kind == "estimators" else _answers(rows), name) for kind, name in _NAMES.items()}
@@ -85,7 +85,7 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
 def folder_comparisons(
     first_rows: Iterable[Row], second_rows: Iterable[Row], first: str, second: str, task: str | None = None
 ) -> list[PairwiseComparison]:
-    """Compare the same cells of two result folders; raises UnknownNameError for a task that one of them lacks."""
+    """Compare equal cells of two result folders; raises UnknownNameError if a folder has no results of `task`."""
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
 
 
@@ -105,9 +105,9 @@ def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
 def with_declared(
     found: Sequence[PairwiseComparison], rows: Sequence[Row], declared: Iterable[ComparisonChoice]
 ) -> list[PairwiseComparison]:
-    """Return comparisons with p-values corrected for all that were declared, whichever of them are shown.
+    """Return comparisons with p-values corrected for all declared comparisons, including those not shown.
 
-    The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
+    The family of tests consists of all declared pairs of cells in `rows`, the whole leaderboard.
     """
     family: dict[frozenset[str], float | None] = {}
     for choice in declared:
@@ -138,12 +138,12 @@ def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | Non
     if one is None or other is None or refused:
         return PairwiseComparison(kind, first, second, one, other, refused)
     if (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
-        return PairwiseComparison(kind, first, second, one, other, "they were scored by other metrics or classes")
+        return PairwiseComparison(kind, first, second, one, other, "they were scored by different metrics or classes")
     return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
 
 def _key(kind: Kind, row: Row) -> Key:
-    """Return what two rows must have in common: hardware first, then protocol, then all else."""
+    """Return the values that two compared rows share: hardware, protocol, split, task, and sensor or estimator."""
     sensor, answer = str(row["sensor"]), answer_name(row)
     of = {"sensors": answer, "estimators": sensor}.get(kind, f"{sensor}, {answer}")
     protocol = "" if kind == "protocols" else row["protocol"]
@@ -152,7 +152,7 @@ def _key(kind: Kind, row: Row) -> Key:
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
-    """Return a table for each question: task, metric, protocol, split and hardware; notes stand below the last."""
+    """Return one table for each combination of task, metric, protocol, split and hardware; the last has the notes."""
     groups = grouped(comparisons, _title)
     tables = [
         TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])).compact()
@@ -193,12 +193,12 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
 
 
 def _probability(p: float | None) -> str:
-    """Return a p-value with two digits."""
+    """Return a p-value as text with two significant digits."""
     return ABSENT if p is None else "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
-    """Return notes that explain the columns and the method of the tables."""
+    """Return notes that explain the columns and the statistical methods of the tables."""
     found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
     if not found:
         return ()
@@ -218,7 +218,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
-    """Return a pair as one flat record; all have the same keys."""
+    """Return a comparison as a flat record; all records have the same keys."""
     row, folds = pair.row, pair.folds
     found: Mapping[str, Any] = {} if pair.difference is None else vars(pair.difference)
     shared = ("task", "rig", "simulated", "protocol", "split", "metric", "unit")

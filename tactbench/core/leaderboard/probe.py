@@ -1,4 +1,4 @@
-"""A leakage probe: each score beside those of shuffled rows, of the first frame alone and of a trivial answer."""
+"""Leakage probe: scores compared with scores from shuffled rows, first frames alone and trivial answers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable
 
 LEAK_SHARE = 0.5
-"""Share of the skill (score beyond the trivial answer's) from which on that of the first frame is called a leak."""
+"""Share of the skill (score beyond the trivial answer's) at which the first frame's skill is called a leak."""
 TAIL = 0.025
-"""Probability of as many right guesses below which the first frame predicts better than a guess."""
+"""Largest probability of guessing as often right as the first frame, for it to be better than a guess."""
 FEWEST = 5
-"""Smallest number of recordings for an interval of the error of first frames."""
+"""Smallest number of test recordings for a verdict on a regression from first frames."""
 COLUMNS = (
     "sensor", "task", "estimator", "split", "score", "95 % interval", "shuffled", "first frame alone",
     "trivial", "verdict",
@@ -31,7 +31,7 @@ _NOTE = (
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
-    """Return a table of finished answers under `deployable` beside their probes; None if nothing was probed."""
+    """Return the table of finished answers under `deployable` and their leakage probes; None without probes."""
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
     for row, first, shuffled in _probed(rows):
@@ -53,7 +53,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
 
 
 def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows, with a stamp where the first frame explains half of the skill or more."""
+    """Return rows, stamped as leaking if the first frame explains half of the skill or more."""
     found: dict[str, list[str]] = {}
     for row, first, _ in _probed(rows):
         if first is not None and _of_first_frame(row, first) == "LEAK":
@@ -63,7 +63,7 @@ def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _probed(rows: Sequence[Row]) -> Iterator[tuple[Row, Row | None, Row | None]]:
-    """Yield each answer that may be probed, the same from first frames, and from shuffled rows."""
+    """Yield each answer with its probe rows: from first frames and with shuffled rows, None if missing."""
 
     def answer(row: Row) -> tuple[str, ...]:
         return row["sensor"], row["task"], row["rig"], answer_name(row)
@@ -79,7 +79,7 @@ def _probed(rows: Sequence[Row]) -> Iterator[tuple[Row, Row | None, Row | None]]
 
 
 def _probe_of(alike: Sequence[Row], protocol: str, split: str) -> Row | None:
-    """Return the same answer under a protocol and split; the row of a cell that was not begun may lack its split."""
+    """Return the row under a protocol and split, or None; the row of a cell that was not begun may lack its split."""
     return next((one for one in alike if one["protocol"] == protocol and one["split"] in (split, None)), None)
 
 
@@ -104,7 +104,7 @@ def _verdicts(row: Row, shuffled: Row | None, first: Row | None) -> Iterator[str
 
 
 def _of_first_frame(row: Row, first: Row | None) -> str:
-    """Return the part of an answer's skill that the first frame explains: LEAK, PART, unknown, or nothing."""
+    """Return the verdict on the skill that the first frame explains: LEAK, PART, too few recordings, or empty."""
     sign, trivial = sign_of(row), row["baseline"]
     if first is None or first["status"] != "done" or trivial is None:
         return ""
@@ -116,10 +116,10 @@ def _of_first_frame(row: Row, first: Row | None) -> str:
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
-    """Return whether the first frame answers better than a guess; None if there are too few recordings.
+    """Return True if the first frame answers better than a guess; None if there are too few recordings.
 
-    Classes: by the exact binomial tail of the number of right answers, one for each recording; the guess is the
-    commonest class. Numbers: if the interval lies beyond the trivial score.
+    Classes: by the exact binomial tail of the number of right answers, one for each recording; a guess is the
+    most frequent class. Numbers: if the interval is better than the trivial score.
     """
     if first["confusion"] is not None:
         table = first["confusion"]

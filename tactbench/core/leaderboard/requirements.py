@@ -1,6 +1,6 @@
-"""Columns of the leaderboard that show which sensors meet given requirements.
+"""Columns of the leaderboard that show, for each sensor, if given requirements are met.
 
-A requirement is met, missed or unknown. A fact that no source states is unknown, and so is one that is only assumed.
+A requirement is met, missed or unknown: unknown if the property is only assumed, or if no source states it.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from tactbench.core.spec.units import conversion
 from tactbench.core.tables.numbers import duration
 
 MET, MISSED, UNKNOWN = "met", "missed", "unknown"
-"""Beginnings of the texts in a column of requirements."""
+"""First words of the texts in a column of requirements."""
 ANSWER, DELAY, RANGE, RATE = "answer", "answer delay", "force range", "rate"
 COLUMNS = ("place", "sensor", "estimator", "score", "notes", "interval", "beyond floor", DELAY, RANGE, RATE, ANSWER)
 _PARTS = ("sampling", "link", "window", "features", "prediction")
-"""Parts of the delay of an answer from readings."""
+"""Parts of the delay between a touch and the answer, for estimators that read the sensor."""
 
 
 class Requirements(NamedTuple):
-    """Requirements on a sensor and its answers; None: no requirement."""
+    """Requirements on a sensor and its answers; None for a property without requirement."""
 
     max_delay_ms: float | None = None
     """Largest time from a touch to the answer [ms]."""
@@ -39,15 +39,15 @@ class Requirements(NamedTuple):
 
 
 def with_requirements(table: Table, required: Requirements, task: TaskSpec, specs: Mapping[str, SensorSpec]) -> Table:
-    """Return the answers of a table of one task with a column for each requirement.
+    """Return a one-task leaderboard with a column for each requirement, without trivial answers.
 
-    Answers that miss fewer requirements come first, then those of which less is unknown, then those of a better place;
-    trivial answers are left out, and those that cannot be used come last.
+    Answers are ordered by the number of missed requirements, then of unknown requirements, then by their place;
+    answers that cannot be used come last.
 
     Parameters
     ----------
     specs
-        By sensor; the range and the rate of a sensor that is not among them are unknown.
+        Specs by name of sensor; range and rate of other sensors are unknown.
     """
     blocks = tuple(_block(block, required, task, specs) for block in table.blocks)
     return replace(table, blocks=tuple(block for block in blocks if block.lines), sections=())
@@ -63,7 +63,7 @@ def _block(block: Block, required: Requirements, task: TaskSpec, specs: Mapping[
             found.append((order, replace(line, texts=dict.fromkeys(COLUMNS, "") | dict(line.texts) | texts)))
     found.sort(key=itemgetter(0))  # equal ones stay in the order of their places
     meet = dict.fromkeys(sensor_name(line.row) for order, line in found if not any(order))
-    verdict = f"All requirements are met by {', '.join(meet)}." if meet else "No answer is known to meet all of them."
+    verdict = f"All requirements are met by {', '.join(meet)}." if meet else "No answer surely meets all requirements."
     verdicts = (verdict,) * (required != Requirements()) + block.verdict
     notes = block.notes
     if required.range_n is not None:
@@ -76,7 +76,7 @@ def _block(block: Block, required: Requirements, task: TaskSpec, specs: Mapping[
 
 
 def standing(row: Row, required: Requirements, task: TaskSpec, spec: SensorSpec | None) -> dict[str, str]:
-    """Return for each column whether a row meets its requirement: ``met: 30 N``, ``missed: 50 Hz``, ``unknown: …``."""
+    """Return a row's text for each requirement's column: ``met: 30 N``, ``missed: 50 Hz``, ``unknown: …``."""
     if spec is not None and not spec.data_sheet.exists:
         return {ANSWER: f"{MISSED}: the sensor is a definition, no device"}
     if row["status"] != "done":
@@ -95,7 +95,7 @@ def standing(row: Row, required: Requirements, task: TaskSpec, spec: SensorSpec 
 
 
 def _delay(row: Row, most_ms: float, *, stated: bool) -> str:
-    """Compare the parts of a delay that are known: their sum is its lower bound."""
+    """Return the text on the delay [ms]; the sum of its known parts is a lower bound."""
     timed: dict[str, Any] = row.get("delay_parts_ms") or {}
     parts = {name: timed[name] for name in timed if stated or name != "sampling"}
     needed = _PARTS if row["looks_at"] == "features" else ("prediction",)
@@ -115,7 +115,7 @@ def _range(spec: SensorSpec | None, least_n: float) -> str:
 
 
 def _rate(row: Row, sampled_hz: float | None, least_hz: float) -> str:
-    """Compare the rate of the sensor, and of answers computed one after the other: the smaller one counts."""
+    """Return the text on the rate: the smaller of the sampling rate and the rate of computing answers [Hz]."""
     answered_hz = 1e3 / row["latency_ms_p50"] if row.get("latency_ms_p50") else None
     known = [rate for rate in (sampled_hz, answered_hz) if rate is not None]
     if known and min(known) < least_hz:
@@ -126,7 +126,7 @@ def _rate(row: Row, sampled_hz: float | None, least_hz: float) -> str:
 
 
 def _stated_rate_hz(task: TaskSpec, spec: SensorSpec | None) -> float | None:
-    """Return the rate of the slowest stream with channels that answers read; None where no source states one."""
+    """Return the rate [Hz] of the slowest stream with features of the task; None if a rate is not from a source."""
     used = [one for one in spec.streams if any(each.kind in task.features for each in one.channels)] if spec else []
     rates = [one.rate_hz if one.rate_source is not None and one.rate_source.tag != "assumed" else None for one in used]
     known = [rate for rate in rates if rate is not None]

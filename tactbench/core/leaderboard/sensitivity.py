@@ -1,6 +1,6 @@
-"""The sensitivity of a simulated comparison: scores with nuisances at the ends of their ranges.
+"""Sensitivity of a simulated comparison: changes of scores with nuisances at the ends of their ranges.
 
-Each set of ends is a result folder of its own, ``assumptions/placement_scatter_mm=lower`` inside the other's.
+Each set of ends has its own result folder, such as ``OUT/assumptions/placement_scatter_mm=lower``.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ _NOTE = (
 
 
 def ranges_of(spec: SensorSpec) -> dict[str, PhysicalRange]:
-    """Return the ranges of a sensor's nuisances and those of its mount, by name."""
+    """Return the ranges of the nuisances of a sensor and its mount, by name of the nuisance."""
     return {**RANGES, **spec.ranges}
 
 
 def name_of(ends: Mapping[str, str]) -> str:
-    """Return the name of a folder by the end of each nuisance: ``offset_scale=lower,placement_scatter_mm=lower``."""
+    """Return the folder name of a set of ends, such as ``offset_scale=lower,placement_scatter_mm=lower``."""
     return ",".join(f"{name}={end}" for name, end in sorted(ends.items()))
 
 
 def ends_of(name: str) -> dict[str, str]:
-    """Return the end of each nuisance from the name of a folder."""
+    """Return the end, ``lower`` or ``upper``, by nuisance from the folder name of a set of ends."""
     return {nuisance: end for nuisance, _, end in (part.partition("=") for part in name.split(","))}
 
 
 class Sensitivity:
-    """The scores of one question, as stated and with nuisances at the ends of their ranges.
+    """Scores of all sensors in one task, as stated and with nuisances at the ends of their ranges.
 
     Parameters
     ----------
     rows
-        As stated: one a cell and replicate.
+        Rows with all nuisances as stated, one for each cell and replicate.
     variants
-        The same by the name of a set of ends; a sensor that has no such nuisance is not among them.
+        Rows by name of a set of ends, without sensors that lack the nuisance.
     """
 
     def __init__(self, rows: Sequence[Row], variants: Mapping[str, Sequence[Row]]) -> None:
@@ -70,17 +70,17 @@ class Sensitivity:
             self.changes[name] = {pair.row["sensor"]: pair for pair in folder_comparisons(found, same, name, "stated")}
 
     def change(self, name: str, sensor: str) -> float:
-        """Return by how much a sensor's score differs from that as stated; 0 where it has no such nuisance."""
+        """Return a sensor's change of score from that as stated; 0 if the sensor lacks the nuisance."""
         pair = self.changes[name].get(sensor)
         return 0.0 if pair is None or pair.difference is None else float(pair.difference.value)
 
     def gain(self, name: str) -> float:
-        """Return by how much better the sensors score than as stated, the mean over them."""
+        """Return the improvement of the score over that as stated, as the mean over the sensors."""
         sign = -sign_of(next(iter(self.stated.values())))
         return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
 
     def verdict(self, name: str) -> str:
-        """Return whether the order of the sensors stays, turns round, or is not shown."""
+        """Return a text on the order of the sensors for a set of ends: stays, turns round, or is not shown."""
         order = _order({**self.stated, **self.rows[name]})
         if any((worse, better) in order for better, worse in self.order):
             return TURNED
@@ -89,14 +89,14 @@ class Sensitivity:
         return "stays" if order == self.order else "shown here only"
 
     def turned(self) -> list[str]:
-        """Return the sets of ends with which the order turns round; of those that hold another, the smaller one."""
+        """Return the smallest sets of ends with which the order of the sensors turns round, without their supersets."""
         found = [name for name in self.rows if self.verdict(name) == TURNED]
         within = {name: ends_of(name).items() for name in found}
         return [name for name in found if not any(within[one] < within[name] for one in found)]
 
 
 def _order(rows: Mapping[str, Row]) -> set[tuple[str, str]]:
-    """Return the pairs of sensors of which the first is shown to be better."""
+    """Return the (better, worse) pairs of sensors of which the first is shown to be better."""
     done = {sensor: row for sensor, row in rows.items() if row["status"] == "done"}
     pairs = permutations(done, 2)
     return {(one, other) for one, other in pairs if difference(done[one], done[other]).verdict == "better"}
@@ -110,7 +110,7 @@ def _order_text(rows: Mapping[str, Row]) -> str:
 
 
 def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
-    """Return the sensitivities that have been computed, by task, protocol, split, rig and estimator."""
+    """Return the sensitivities computed in a folder, by (task, protocol, split, rig, estimator)."""
 
     def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
         answers = (row for row in rows if not row["is_baseline"])
@@ -128,7 +128,7 @@ def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
 
 
 def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:
-    """Return rows, one a cell, with the nuisances on which the order of the sensors depends, where it is computed."""
+    """Return rows, one for each cell, with the nuisances that the order of the sensors depends on, if computed."""
     named: dict[str, list[str]] = {}
     for found in sensitivities(store).values():
         names = list(dict.fromkeys(nuisance for name in found.turned() for nuisance in ends_of(name)))
@@ -137,7 +137,7 @@ def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[s
 
 
 def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[TextTable]:
-    """Return a table for each question; `specs`, by sensor, have ranges and sources."""
+    """Return one table for each sensitivity; `specs` by sensor supply ranges and their sources."""
     return [_table(found, specs) for found in sensitivities(store).values()]
 
 
@@ -175,14 +175,14 @@ def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
 
 
 def _alike(texts: Mapping[str, str]) -> str:
-    """Return the text of all sensors, each with its name where they differ."""
+    """Return the text that all sensors share, or the texts with the sensors' names if they differ."""
     if len(set(texts.values())) < 2:
         return next(iter(texts.values()), "")
     return ", ".join(f"{sensor} {text}" for sensor, text in texts.items())
 
 
 def _scores(found: Sensitivity, name: str, sensor: str) -> tuple[str, str]:
-    """Return a sensor's score with a set of ends, and how it differs from that as stated."""
+    """Return as text a sensor's score with a set of ends, and its change from the score as stated."""
     pair = found.changes[name].get(sensor)
     if pair is None or pair.first_row is None:
         return ABSENT, ABSENT

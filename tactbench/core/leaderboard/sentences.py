@@ -1,6 +1,6 @@
-"""The sentences above and below a block: a closed list, each with the condition under which it is true.
+"""Sentences above and below a leaderboard block: a closed list, with the condition for each sentence.
 
-docs/tables.md has the list. At most two sentences stand above and five notes below, in the order of this module.
+docs/tables.md has the list. At most two sentences are above and five notes below, in the order of this module.
 """
 
 from __future__ import annotations
@@ -19,65 +19,65 @@ from tactbench.core.tables.text import cut
 
 MOST_BELOW = 5
 MOST_NAMES = 4
-"""Number of answers that a sentence names; it counts the others."""
+"""Largest number of answers named in a sentence; further answers are counted."""
 LONGEST = 300
-"""Characters of a note."""
+"""Largest number of characters of a note."""
 ORDER_DEPENDS_ON = "order_depends_on"
-"""Key of a row: the nuisances at whose ends the order of the sensors turns round, where that has been computed."""
+"""Key of a row with the nuisances at whose ends the order of the sensors turns round, if computed."""
 NO_BETTER, UNSHOWN, STAMPED, FOUND, SHARED = "–", "*", "‡", "!", "="
 
 
 class Note(NamedTuple):
-    """A line below a table."""
+    """A note below a table."""
 
     text: str
     printed: bool = False
-    """True if a table in a paper needs it, to explain a mark or the scores."""
+    """True if the note is printed below a table in a paper too, since it explains a mark or the scores."""
 
 
 @dataclass(frozen=True)
 class Board:
-    """The rows of a block."""
+    """The result rows of a leaderboard block, grouped for its sentences."""
 
     placed: Sequence[Row]
-    """Answers better than the trivial one of their sensor, the best first."""
+    """Answers that are better than the trivial answer of their sensor, the best first."""
     ranks: Mapping[str, Rank]
-    """Their ranks by the names of their cells; empty if there are too few campaigns or held-out units."""
+    """Ranks of the placed answers by name of the cell; empty if there are too few campaigns or held-out units."""
     unplaced: Sequence[Row]
-    """Answers that are no better than the trivial one of their sensor."""
+    """Answers that are no better than the trivial answer of their sensor."""
     trivial: Sequence[Row]
     stopped: Sequence[Row]
-    """Cells without a score."""
+    """Rows of cells without a score: failed, stopped or skipped."""
     bars: Bars
 
     @property
     def answers(self) -> list[Row]:
-        """Return the answers, those with a place first."""
+        """All answers of the block, placed answers first."""
         return [*self.placed, *self.unplaced]
 
     @property
     def finished(self) -> list[Row]:
-        """Return the answers and the trivial answers."""
+        """The answers and the trivial answers of the block."""
         return [*self.answers, *self.trivial]
 
     @property
     def by_floor(self) -> bool:
-        """Return whether places go by errors beyond the floor."""
+        """True if places are by errors beyond the noise floor of the reference."""
         return beyond_floor(self.placed)
 
     def name(self, row: Row) -> str:
-        """Return the name of a row in a sentence: its estimator, with the sensor where there are several."""
+        """Return the name of a row in a sentence: its estimator, with the sensor if the block has several sensors."""
         several = len({one["sensor"] for one in self.finished}) > 1
         return f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row)
 
     def marks(self, row: Row) -> list[str]:
-        """Return the marks of a finished row, other than its place."""
+        """Return the marks (``*``, ``‡``, ``!``) of a finished row."""
         unshown = not row["is_baseline"] and not self.bars.no_better(row) and self.bars.unshown(row)
         found = {UNSHOWN: unshown, STAMPED: row["stamps"], FOUND: row.get("findings")}
         return [mark for mark, has in found.items() if has]
 
     def bars_of(self, rows: Sequence[Row]) -> str:
-        """Return the trivial answers that rows are compared with, and their scores."""
+        """Return as text the trivial answers to compare `rows` with, and their scores."""
         several = len({row["sensor"] for row in self.answers}) > 1
         texts = (
             f"{row['sensor']}/" * several
@@ -88,18 +88,18 @@ class Board:
 
 
 def _some(names: Sequence[str]) -> str:
-    """Return a list of names, and how many more there are."""
+    """Return a text of at most `MOST_NAMES` names, and the number of further names."""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return ", ".join(names[:MOST_NAMES]) + more
 
 
 def above(board: Board) -> tuple[str, ...]:
-    """Return the sentences above a table."""
+    """Return at most two sentences above a table: on its outcome and on a caveat."""
     return tuple(filter(None, (_outcome(board), _timed(board) or _dependence(board))))
 
 
 def _outcome(board: Board) -> str:
-    """Return which answer is best, or why none is shown to be."""
+    """Return a sentence on the best answer, or on the reason why no answer is shown to be best."""
     if not board.placed:
         count, bars = len(board.unplaced), board.bars_of(board.unplaced)
         of = "The only answer" if count == 1 else f"None of {count} answers"
@@ -130,7 +130,7 @@ def _outcome(board: Board) -> str:
 
 
 def _too_few(rows: Sequence[Row]) -> str:
-    """Return the number of campaigns or held-out units, which is too small for intervals."""
+    """Return a clause that the number of campaigns or held-out units is too small for intervals."""
     if held_out(rows[0]):
         unit, more = str(rows[0]["replicate_unit"]), " of each class" if rows[0]["classes"] else ""
     else:
@@ -140,7 +140,7 @@ def _too_few(rows: Sequence[Row]) -> str:
 
 
 def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
-    """Return the answer that is closest to the best one, and the difference of their scores."""
+    """Return a clause on the answer closest to the best answer, with the difference of their scores."""
     from tactbench.core.statistics.paired import difference  # numerics
 
     unit, sign = first["unit"], -sign_of(first)
@@ -154,7 +154,7 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
 
 
 def _timed(board: Board) -> str:
-    """Return the trivial answers that read only the time, if an answer of their sensor is not shown to be better."""
+    """Return a sentence on trivial answers that use the time alone, if an answer is not shown to be better."""
     held = [row for row in board.answers if board.bars.no_better(row) or board.bars.unshown(row)]
     bars = [trivial for row in held if (trivial := board.bars.trivial(row)) is not None]
     timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
@@ -165,20 +165,20 @@ def _timed(board: Board) -> str:
 
 
 def _dependence(board: Board) -> str:
-    """Return the nuisances on which the order of simulated sensors depends, where that has been computed."""
+    """Return a sentence on the nuisances that the order of simulated sensors depends on, if computed."""
     named = dict.fromkeys(name for row in board.answers for name in row.get(ORDER_DEPENDS_ON) or ())
     return f"The order of the sensors depends on {' and '.join(named)} (`tactbench sensitivity`)." if named else ""
 
 
 def below(board: Board) -> tuple[Note, ...]:
-    """Return the notes below a table."""
+    """Return at most five notes below a table."""
     notes = [*_marks(board), *_ended(board, failed=True), *_protocol(board), *_floors(board), *_compared(board),
              *_how(board), *_hosts(board), *_ended(board, failed=False)]  # fmt: skip
     return tuple(note._replace(text=cut(note.text, LONGEST)) for note in notes)[:MOST_BELOW]
 
 
 def _ended(board: Board, *, failed: bool) -> Iterator[Note]:
-    """Yield which cells failed, or were skipped, and why."""
+    """Yield a note on the cells that failed, or on those that were skipped, with the reason."""
     rows = [row for row in board.stopped if (row["status"] in STOPPED) is failed]
     if not rows:
         return
@@ -189,7 +189,7 @@ def _ended(board: Board, *, failed: bool) -> Iterator[Note]:
 
 
 def _marks(board: Board) -> Iterator[Note]:
-    """Yield a note for each mark in the table; they are never more than the notes that may be shown."""
+    """Yield one note for each mark in the table, at most five notes."""
     finished = board.finished
     for mark, key in ((STAMPED, "stamps"), (FOUND, "findings")):
         texts = grouped([(str(text), row) for row in finished for text in row.get(key) or ()], itemgetter(0))
@@ -213,14 +213,14 @@ def _marks(board: Board) -> Iterator[Note]:
 
 
 def _protocol(board: Board) -> Iterator[Note]:
-    """Yield a note on a protocol that uses the test set."""
+    """Yield a note on a protocol that uses statistics of the test set."""
     protocol = next((row["protocol"] for row in board.finished if row["dagger"]), None)
     if protocol is not None:
         yield Note(f"Protocol {protocol} uses means and deviations of the test set, unknown in use.", printed=True)
 
 
 def _floors(board: Board) -> Iterator[Note]:
-    """Yield definitions of the errors of force, and the floor that the noise of the reference sets to them."""
+    """Yield notes that define the errors of force, and the floor of these errors due to the reference's noise."""
     simulated = next((row for row in board.finished if row.get("reference_score") is not None), None)
     if simulated is not None:
         true, noisy = (metric_name({**row, "unit": "1"}) for row in (simulated, against_reference(simulated)))
@@ -240,7 +240,7 @@ def _floors(board: Board) -> Iterator[Note]:
 
 
 def _compared(board: Board) -> Iterator[Note]:
-    """Yield how rows of several sensors are compared on recordings, and what that comparison cannot show."""
+    """Yield a note on the comparison of several sensors on recordings, and on its limitations."""
     rows = [row for row in board.placed if held_out(row)]
     if not board.ranks or len({row["sensor"] for row in rows}) < 2:
         return
@@ -257,7 +257,7 @@ def _compared(board: Board) -> Iterator[Note]:
 
 
 def _how(board: Board) -> Iterator[Note]:
-    """Yield definitions of score and interval."""
+    """Yield a note that defines score and interval."""
     sentences = []
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
@@ -274,7 +274,7 @@ def _how(board: Board) -> Iterator[Note]:
 
 
 def _hosts(board: Board) -> Iterator[Note]:
-    """Yield the reason why times cannot be compared."""
+    """Yield a note with the reason why the times of a block cannot be compared."""
     timed = [row for row in board.answers if row["fit_s"] is not None]
     hosts = len({str(row.get("host") or "") for row in timed})
     at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)

@@ -1,7 +1,7 @@
-"""Builds the table object that every format renders.
+"""Construction of the leaderboard object that is rendered in every format.
 
-Rows that may be compared stand in one block, and ranks are within a block. Rows under different tasks, protocols or
-splits, and rows from the twin and from hardware, are not comparable. A table depends on its rows, not on their order.
+Comparable rows are in one block, and ranks are within a block. Rows under different tasks, protocols or
+splits, or from simulation and hardware, are not comparable. A table depends on its rows, not on their order.
 Control characters in its texts are escaped (`text.visible`); formats escape their own syntax.
 """
 
@@ -40,54 +40,54 @@ if TYPE_CHECKING:
 
 _Key = tuple[str, str, str, str]
 LONGEST = 1000
-"""Largest number of characters of a sentence on the provenance."""
+"""Largest number of characters of a sentence on provenance."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Rows that may be compared."""
+    """A part of a leaderboard with comparable rows, ranked among themselves."""
 
     title: str
-    """Task and its question."""
+    """Name and question of the task."""
     setting: str
-    """Metric, protocol and split."""
+    """Metric, protocol and split of the rows."""
     origin: str
-    """Simulated, emulated or measured."""
+    """Origin of the rows: simulated, emulated or measured."""
     lines: tuple[Line, ...]
     verdict: tuple[str, ...] = ()
-    """At most two sentences on the result."""
+    """At most two sentences above the table, on the outcome of the comparison."""
     notes: tuple[Note, ...] = ()
-    """At most five notes on marks and numbers."""
+    """At most five notes below the table, on marks and numbers."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A leaderboard, ready to be shown."""
+    """A leaderboard of blocks of comparable rows, with sentences and notes, for output in any format."""
 
     blocks: tuple[Block, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: events and probes."""
+    """Tables below the blocks: event detection and leakage probes."""
     provenance: tuple[Row, ...] = ()
-    """Versions, machine and commit of the runs."""
+    """Software versions, machine and commit of each run with rows in the table."""
 
     @property
     def lines(self) -> list[Line]:
-        """Return the lines of all blocks."""
+        """The lines of all blocks."""
         return [line for block in self.blocks for line in block.lines]
 
     @property
     def rows(self) -> list[Row]:
-        """Return the rows, in the order of the lines."""
+        """The result rows of all blocks, in the order of the lines."""
         return [line.row for line in self.lines]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return the notes of all blocks, each once."""
+        """The notes of all blocks without repetitions."""
         return tuple(dict.fromkeys(note.text for block in self.blocks for note in block.notes))
 
     @property
     def footer(self) -> tuple[str, ...]:
-        """Return the provenance in sentences, for files."""
+        """The provenance in sentences, for tables in files."""
         from tactbench.core.provenance.gather import foot
 
         made_by = foot(self.provenance) if self.provenance else ()
@@ -95,14 +95,14 @@ class Table:
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row a cell over its replicates, with stamps of leaks and the nuisances its order depends on."""
+    """Return one row for each cell over its replicates, with stamps of leaks and decisive nuisances."""
     from tactbench.core.leaderboard.sensitivity import with_dependence  # numerics
 
     return with_dependence(with_leaks(over_replicates(rows)), store)
 
 
 def table_of(store: Store, rows: Sequence[Row]) -> Table:
-    """Return the leaderboard of rows of a result folder, one a cell, with their tasks' questions; see `build_table`."""
+    """Return the leaderboard of a result folder's rows, one for each cell, with provenance; see `build_table`."""
     tasks = with_declared_of(installed(), rows).tasks
     names = {str(row["task"]) for row in rows}.intersection(tasks.names())
     made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
@@ -113,16 +113,16 @@ def table_of(store: Store, rows: Sequence[Row]) -> Table:
 def build_table(
     rows: Sequence[Row], provenance: Sequence[Row] = (), *, questions: Mapping[str, str] | None = None
 ) -> Table:
-    """Arrange `rows` into ranked blocks, with their sentences and notes.
+    """Return `rows` arranged into ranked blocks with sentences and notes.
 
     Parameters
     ----------
     rows
         Rows of one folder or of several, in any order.
     provenance
-        Versions, machine and commit of their runs: see `tactbench.core.provenance.gather`.
+        Versions, machine and commit of the runs; see `tactbench.core.provenance.gather`.
     questions
-        Questions of the tasks, by name.
+        Questions of the tasks, by name of the task.
     """
     groups = sorted(_grouped(sorted(rows, key=itemgetter("cell"))).items(), key=lambda group: _order(group[0]))
     blocks = tuple(_block(key, members, (questions or {}).get(key[0], "")) for key, members in groups)
@@ -179,16 +179,16 @@ def _origin(finished: Sequence[Row], hardware: str) -> str:
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
-    """Return the sort key of a block: within a task, probes and leaking splits come last."""
+    """Return the sort key of a block: by task, with probes and leaking splits last."""
     task, protocol, split, _ = key
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
 def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
-    """Group rows that may be compared.
+    """Return rows grouped into comparable ones, by (task, protocol, split, hardware).
 
-    The row of a cell that was not begun lacks its split, unless one was chosen, and its origin: it stands with the
-    finished cells of its rig, if these agree.
+    The row of a cell that was not begun may lack its split and its origin: it is added to the
+    group of the finished cells with its task, protocol and rig, if there is only one such group.
     """
     done = [row for row in rows if row["status"] == "done"]
     groups = grouped(done, lambda row: (row["task"], row["protocol"], row["split"], hardware_name(row)))
@@ -203,16 +203,16 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
 
 
 def _may_be_placed(row: Row) -> bool:
-    """Return whether a row has enough campaigns or held-out units for a place."""
+    """Return True if a row has enough campaigns or held-out units for a place."""
     enough = (row.get("n_replicates") or 0) >= FEWEST
     return enough if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None
 
 
 def errors(results: Sequence[Row]) -> list[float]:
-    """Return the numbers by which answers of one metric are ordered, of which less is better.
+    """Return (n,) numbers by which answers with one metric are ordered; smaller is better.
 
-    The score; of errors of force the mean square beyond the floor of the reference, if all rows have one. It may be
-    negative where the error beyond the floor is 0, so that two answers of one sensor keep their order.
+    These are signed scores; for errors of force, mean squares beyond the floor of the reference, if all rows have one,
+    which may be negative where the error beyond the floor is 0, so that answers of one sensor keep their order.
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]

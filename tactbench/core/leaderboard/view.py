@@ -1,4 +1,4 @@
-"""Selects the rows and columns of a table that are printed for people."""
+"""Selection of the rows and columns of a leaderboard that are printed for people."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 
 CELL, REASON = "cell", "reason"
-"""Columns for the names of cells, and for the reasons why they did not finish."""
+"""Names of the columns for cell names, and for reasons why cells did not finish."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "training", "published", "delay after touch",
 )  # fmt: skip
-"""Columns that a terminal leaves out first, in this order; those that are chosen by name are never left out."""
+"""Columns to leave out on a narrow terminal, in this order; columns selected by name are never left out."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A selection of columns to print."""
+    """Selection of the leaderboard columns to print."""
 
     wide: bool = False
-    """True prints all columns."""
+    """True to print all columns."""
     columns: tuple[str, ...] = ()
-    """Columns to print instead of the default ones; see `known_columns`."""
+    """Names of the columns to print instead of the default columns; see `known_columns`."""
 
 
 DEFAULT_VIEW = View()
@@ -38,12 +38,12 @@ WHOLE = View(wide=True)
 
 
 def known_columns(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of columns that are given by these or by their names for programs (``rank``).
+    """Return the names of columns given by name (``place``) or by name for programs (``rank``).
 
     Raises
     ------
     UnknownNameError
-        If there is no such column.
+        If a name is not that of a column.
     """
     known = {name: name for name in (*COLUMNS, CELL)} | {shown: name for name, shown in SHOWN.items()}
     names = [name.strip() for name in names]
@@ -54,17 +54,17 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
-    """Return the tables that are printed, in their order."""
+    """Return the tables to print: one for each block, then events and probes."""
     return [*grids(table, view), *table.sections]
 
 
 def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
-    """Return the printed table of each block."""
+    """Return the table to print for each block."""
     return [grid(block, view) for block in table.blocks]
 
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
-    """Return the printed table of a block."""
+    """Return the table to print for a block, with the columns of `view`."""
     short = not view.wide and not view.columns
     # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
@@ -97,7 +97,7 @@ def _texts(line: Line) -> dict[str, str]:
 
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
-    """Return the headings of columns: a score by its metric and unit, an interval by its level."""
+    """Return the headings of columns, such as metric and unit for a score, and confidence level for an interval."""
     rows = [line.row for line in block.lines]
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
@@ -113,7 +113,7 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
 
 
 def best(table: Table, count: int) -> Table:
-    """Return the table with the first `count` answers of each sensor in each block; places stay those among all."""
+    """Return the table with the best `count` answers of each sensor in each block, with places among all answers."""
     blocks = []
     for block in table.blocks:
         found: Counter[str] = Counter()

@@ -1,1 +1,1 @@
-"""The matrix: which cells there are, where their results lie, and how they are run."""
+"""The matrix: planning of cells, running them, and storage of their results."""

@@ -1,6 +1,6 @@
-"""Cells on a Dask cluster: a client of the same `solve` that the run's own processes carry out.
+"""Engine that evaluates cells on a Dask cluster, with the same function as the local engines.
 
-Workers need this run's versions and sources and see its files at the same paths. A worker carries each cell out in a
+Workers need the versions and sources of this run, and its files at the same paths. A worker evaluates each cell in a
 child process, within the same limits.
 """
 
@@ -33,22 +33,22 @@ from tactbench.core.provenance.source import ANSWERING, sources_of, versions
 from tactbench.core.thread_limit import VARIABLES
 
 CONNECT_S = 10.0
-"""Seconds to wait for a scheduler."""
+"""Time limit for connecting to the scheduler [s]."""
 GATHER_S = 60.0
-"""Seconds to wait for the first worker."""
+"""Time limit for the first worker to connect [s]."""
 
 
 class Dask(Engine):
-    """The engine; it connects when it is entered.
+    """Engine on a Dask cluster; it connects on entering its context.
 
     Parameters
     ----------
     jobs
-        Workers to start where there is no address; each carries out one cell at a time.
+        Number of workers to start if there is no address; each evaluates one cell at a time.
     limits
-        What a cell may take.
+        Limits of time and memory of a cell.
     scheduler
-        Address, as ``tcp://HOST:8786``; None: a scheduler and workers on this machine.
+        Address of the scheduler, as ``tcp://HOST:8786``; None: start a scheduler and workers on this machine.
     """
 
     def __init__(self, jobs: int, limits: Limits, scheduler: str | None) -> None:
@@ -56,12 +56,12 @@ class Dask(Engine):
         self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
 
     def __enter__(self) -> Dask:
-        """Connect, or start a cluster.
+        """Connect to the scheduler, or start a local cluster.
 
         Raises
         ------
         UsageError
-            If no scheduler answers, or a worker's versions or sources differ from this run's.
+            If no scheduler responds, or the versions or sources of a worker differ from those of this run.
         """
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         threads = {name: os.environ.get(name, "1") for name in VARIABLES}
@@ -82,20 +82,20 @@ class Dask(Engine):
                 self._client.wait_for_workers(1, timeout=GATHER_S)
             except (OSError, ValueError) as error:
                 raise UsageError(
-                    f"No Dask scheduler with a worker answers at {self._scheduler}: {error}.",
+                    f"No Dask scheduler with a worker responds at {self._scheduler}: {error}.",
                     hint="Start `dask scheduler` and `dask worker ADDRESS`, or unset DASK_SCHEDULER_ADDRESS.",
                 ) from error
             for address, there in self._client.run(_prepared, threads).items():
                 if differ := differences(environment(), there):
                     raise UsageError(
-                        f"The Dask worker at {address} cannot be used: here and there {'; '.join(differ[:3])}.",
+                        f"The Dask worker at {address} differs from this run (here -> there): {'; '.join(differ[:3])}.",
                         hint="Start workers in the environment of this run, and stop the others.",
                     )
             self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Disconnect; what is under way is cancelled."""
+        """Disconnect from the cluster; cells in progress are cancelled."""
         with interrupts_held():
             super().__exit__()
             self._stack.close()
@@ -113,18 +113,18 @@ class Dask(Engine):
             try:
                 yield of[future], future.result()
             except KilledWorker as error:
-                yield of[future], Crashed(f"Workers ended while they carried it out: {error}.")
+                yield of[future], Crashed(f"Workers ended while evaluating the cell: {error}.")
             except Exception as error:
                 lost = EngineError(
-                    f"The Dask cluster did not carry it out: {error_text(error)}.",
-                    hint="Give the same command again: what was finished is kept.",
+                    f"The Dask cluster did not evaluate the cell: {error_text(error)}.",
+                    hint="Give the same command again: finished cells are kept.",
                 )
                 yield of[future], lost
 
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Have processes that are started within ignore Ctrl-C at the terminal: the run ends them."""
+    """Return a context in which started processes ignore Ctrl-C at the terminal, since the run ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -137,7 +137,7 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def carry_out(work: Callable[[Any], Any], job: Job, folder: str, limits: Limits) -> Any:
-    """Carry out one cell in a child process of this worker; return its result or the error that stopped it."""
+    """Evaluate one cell in a child process of this worker; return its result or the error that stopped it."""
     try:
         os.chdir(folder)
         check_content(job)
@@ -148,7 +148,7 @@ def carry_out(work: Callable[[Any], Any], job: Job, folder: str, limits: Limits)
 
 
 def _prepared(threads: Mapping[str, str]) -> dict[str, str]:
-    """Prepare a worker for having child processes, and return its environment."""
+    """Prepare a worker for starting child processes, and return its versions and digests of sources."""
     multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
     preload("tactbench.core.matrix.preloaded")
     os.environ.update(threads)
@@ -156,7 +156,7 @@ def _prepared(threads: Mapping[str, str]) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    """Return versions and digests of sources that may change a number."""
+    """Return the versions and source digests, by name, that may change a result."""
     registry = installed()
     modules = [owner.module for family in (registry.tasks, registry.estimators) for owner in family.all_owned()]
     return {**versions(), **sources_of(modules, ANSWERING)}

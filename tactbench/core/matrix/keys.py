@@ -1,4 +1,4 @@
-"""Keys of recordings and results: digests of everything that determines them.
+"""Keys of recordings and results: digests of all inputs that determine a recording or result.
 
 A key is the digest of its sections: configuration, versions, source of each package (with its descriptors) and data.
 ``tactbench why`` compares the sections of two keys.
@@ -27,12 +27,12 @@ _canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), default=rep
 
 @dataclass
 class Keys:
-    """The keys of one run."""
+    """Keys of the recordings and results of one run."""
 
     registry: Registry
 
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
-        """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
+        """Return the key of a cell's result, and the key's sections; `data` has content digests by recording."""
         task = self.registry.tasks.owned(cell.task)
         modules = [task.module, self.registry.tasks[cell.task].spec.features_by]
         return self._of_answer(cell, data, modules, task=task.declared or cell.task)
@@ -40,7 +40,7 @@ class Keys:
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
     ) -> tuple[str, Sections]:
-        """Return the key, and its sections, of a cell for which a caller in Python gives objects, as to `solve`.
+        """Return the key, and its sections, of a cell for which a Python caller gives objects, as to `solve`.
 
         Raises ValueError as :func:`identity_of` does.
         """
@@ -53,7 +53,7 @@ class Keys:
     def _of_answer(
         self, cell: Cell, data: Mapping[Path, str], modules: list[str | None], named: bool = True, **more: Any
     ) -> tuple[str, Sections]:
-        """Return the key of a result and its sections; the names of recordings are shown but do not count."""
+        """Return the key of a result and its sections; names of recordings are in the sections, but not in the key."""
         estimator = self.registry.estimators.owned(cell.estimator) if named else None
         modules += [estimator.module, estimator.descriptor.where] if estimator else []
         sections = {
@@ -72,16 +72,16 @@ class Keys:
     def of_recording(
         self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: RigFile | None = None
     ) -> str:
-        """Return the key of a recording that a rig makes."""
+        """Return the key of a recording to be made by a rig."""
         made_by = self._making(sensor, rig, rig_file, scene)
         return digest_of(_canonical({**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}))
 
     def _making(self, sensor: str, rig: str, rig_file: RigFile | None, scene: Scene) -> Sections:
-        """Return the sections of a recording's key that do not depend on its scene's content, role and seed.
+        """Return the sections of a recording's key, apart from the content of its scene, its role and its seed.
 
         Notes
         -----
-        Recordings of real devices stay valid when the code of their drivers changes: their key covers sensor, rig and
+        Recordings of real devices stay valid when the code of drivers changes: such a key covers sensor, rig and
         rig file alone.
         """
         stated = "" if rig_file is None else rig_file.model_dump_json()
@@ -112,14 +112,14 @@ def differences(
     *,
     same: Callable[[Any, Any], bool] = lambda old, new: _canonical(old) == _canonical(new),
 ) -> list[str]:
-    """Return a sentence for each difference of two mappings.
+    """Return one sentence, ``name old -> new``, for each difference of two nested mappings.
 
     Parameters
     ----------
     within
-        Beginning of each sentence.
+        Text at the beginning of each sentence.
     same
-        Comparison of values that are not mappings; by default as JSON.
+        Function that compares values that are not mappings; by default as JSON.
     """
     found = []
     for name in sorted({*before, *now}):

@@ -1,15 +1,15 @@
 """Merging of result folders of several machines.
 
-The result is the union of the folders' cells, by name. Of two of one name
+The result is the union of the folders' cells. Of two cells with one name
 
-- finished counts more than not finished; of two that did not finish, the one whose status stands first in
+- a finished one is kept rather than an unfinished one; of two unfinished cells, the one whose status is first in
   `tactbench.core.spec.row.STATUSES` is kept, then the one of the host with the smaller id;
-- two finished ones are equal if configuration, versions and source are, and what a seed decides agrees to a relative
-  1e-9: one that was timed, then the one of the host with the smaller id is kept, whole, so that times of two hosts are
+- two finished ones are equal if configuration, versions and source are, and seeded values agree to a relative
+  1e-9: a timed one, then the one of the host with the smaller id is kept as a whole, so that times of two hosts are
   not mixed;
-- anything else is a contradiction: nothing is written.
+- all other pairs are contradictions, and nothing is written.
 
-Recordings of one name are taken from the folder whose cells are kept.
+Recordings with one name are taken from the folder whose cells are kept.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from tactbench.core.matrix.store import Row, Store, writing
 from tactbench.core.spec.row import STATUSES
 
 SAME_SCORE = 1e-9
-"""Relative difference of scores of the same cell on two kinds of processor: they add millions of terms in another
+"""Largest relative difference of scores of one cell on two kinds of processor, which add millions of terms in another
 order."""
 _SHOWN = 10
-"""Number of contradictions that a message lists."""
+"""Largest number of contradictions listed in a message."""
 _DECIDES = ("configuration", "task", "estimator", "versions", "source")
-"""Sections of a key that two results of one name must share."""
+"""Sections of a key that must be equal for two results with the same name."""
 
 SEED_DECIDES = (
     "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "reference_floor",
@@ -42,38 +42,38 @@ SEED_DECIDES = (
     "n_train", "n_test",
     "counts", "chosen", "scores", "confusion", "classes", "split", "stamps", "dagger",
 )  # fmt: skip
-"""Keys of a row that depend on configuration and seed alone, except for the last bits of numbers."""
+"""Keys of a row with values that depend on configuration and seed alone, except for the last bits of numbers."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """Summary of a merge."""
+    """Summary of a merge: rows, number of recordings, and files left out."""
 
     rows: tuple[Row, ...]
     recordings: int
     left_out: tuple[str, ...]
-    """Sentences about cells that could not be read."""
+    """One sentence for each file of a cell that could not be read."""
 
 
 def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | None = None) -> Merged:
-    """Merge `folders` into the new folder `out`, which does not remain if that fails.
+    """Merge result folders into the new folder `out`, which is not created if merging fails.
 
     Parameters
     ----------
     folders
-        Result folders; they are only read.
+        Result folders, which are not changed.
     out
-        A folder that does not exist yet.
+        Path of a folder that does not exist yet.
     also
-        Function that writes further files into the new folder, before that gets its name.
+        Function that writes further files into the new folder, called before the folder is renamed to `out`.
 
     Raises
     ------
     FolderError
-        If a folder holds no results, two contradict each other, or `out` exists or cannot be written.
+        If a folder contains no results, two folders contradict each other, or `out` exists or cannot be written.
     """
     if os.path.lexists(out):
-        raise FolderError(f"{out} exists already.", hint="Give --out a folder that does not; merging changes none.")
+        raise FolderError(f"{out} exists already.", hint="Give --out a folder that does not exist yet.")
     kept: dict[str, tuple[Row, Store]] = {}
     against: list[str] = []
     left_out: list[str] = []
@@ -82,7 +82,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
         if not rows:
             troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
-            raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
+            raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Give folders of `run --out`.")
         for row in rows:
             other = kept.setdefault(row["cell"], (row, store))
             if "done" == row["status"] == other[0]["status"] and (found := _contradiction(other, (row, store))):
@@ -92,7 +92,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         more = f"; and {len(against) - _SHOWN} more" if len(against) > _SHOWN else ""
         raise FolderError(
             f"The folders contradict each other: {'; '.join(against[:_SHOWN])}{more}.",
-            hint="Nothing was written. Leave one of them out, or run the named cells again with the same version.",
+            hint="Nothing was written. Leave out one folder, or run the listed cells again with the same version.",
         )
     with writing(out):
         out.absolute().parent.mkdir(parents=True, exist_ok=True)
@@ -114,13 +114,13 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
 
 
 def _precedence(one: tuple[Row, Store]) -> tuple[Any, ...]:
-    """Return the sort key of a result: of results with one name the smallest is kept."""
+    """Return the sort key of a result; of results with the same name, the smallest is kept."""
     row, _ = one
     return STATUSES.index(row["status"]), row["latency_n"] is None, row["host"], row["key"]
 
 
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
-    """Return the inadmissible differences of two finished cells of one name, or an empty string."""
+    """Return the inadmissible differences of two finished cells with the same name, or an empty string."""
     first, second = ({name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other))
     for sections in (first, second):  # a run times its first replicate, which may be another's second
         sections["configuration"] = {**(sections["configuration"] or {}), "timed": None}
@@ -129,7 +129,7 @@ def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Return whether two values of a row agree, numbers to a relative `SAME_SCORE`."""
+    """Return True if two values of a row are equal, numbers within the relative tolerance `SAME_SCORE`."""
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, int | float) and isinstance(other, int | float):
@@ -138,7 +138,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _link(path: Path, target: Path) -> None:
-    """Link a recording, which never changes, to a second path; copy it where links are not supported."""
+    """Make a hard link to a recording at `target`; copy the file if links are not supported."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(path, target)

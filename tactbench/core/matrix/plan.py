@@ -1,4 +1,4 @@
-"""The cells of a matrix; every name is checked before anything runs."""
+"""Planning of the cells of a matrix; all names are checked before any cell is run."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _AS_PLANNED = Simulation()
 ALIKE = (
     "sensor", "task", "rig", "protocol", "split", "estimator", "seed", "declared_task", "include_incomplete",
 )  # fmt: skip
-"""Fields that rows and cells have in common."""
+"""Names of the fields that result rows and cells have in common."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination of sensor, task, rig, protocol and estimator, on one replicate."""
+    """One combination of sensor, task, rig, protocol, split and estimator, for one replicate."""
 
     sensor: str
     task: str
@@ -43,19 +43,19 @@ class Cell:
     params: tuple[tuple[str, Any], ...]
     baseline: bool
     seed: int
-    """Random seed of this replicate's scenes and estimators; it identifies the replicate."""
+    """Random seed of this replicate's scenes and estimators, which identifies the replicate."""
     timed: bool = True
-    """Whether fit time and latency are measured, while no other cell runs; true of the first replicate."""
+    """True if fit time and latency are measured, with no other cell running; by default for the first replicate."""
     simulation: Simulation = _AS_PLANNED
-    """Settings of a simulated rig."""
+    """Settings of the simulation, if the rig is simulated."""
     include_incomplete: bool = False
-    """Whether incomplete recordings take part."""
+    """True to include incomplete recordings in the evaluation."""
     declared_task: str = ""
-    """Declaration of the task in the recordings, as JSON; empty for an installed task."""
+    """Declaration of a task stated in the recordings, as JSON; empty for an installed task."""
 
     @cached_property
     def name(self) -> str:
-        """A readable name, unique in a matrix."""
+        """Name of the cell, unique in a matrix: sensor/task/rig/protocol:split/estimator/seed."""
         options = "".join(f",{key}={value}" for key, value in self.params)
         split = f":{self.split}" if self.split else ""
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
@@ -63,7 +63,7 @@ class Cell:
 
 
 def cell_of(row: Mapping[str, Any]) -> Cell:
-    """Return the cell of a row."""
+    """Return the cell of a result row."""
     cell = Cell(
         **{name: row[name] for name in ALIKE},
         params=tuple(sorted(row["params"].items())),
@@ -77,13 +77,13 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
 
 
 def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:
-    """List the cells of `matrix` on known `sensors`, in the order in which they are run and stored.
+    """Return the cells of `matrix` on installed `sensors`, in the order in which they are run and stored.
 
     Raises
     ------
     UsageError
-        If a name is unknown, a protocol or split is not one of the task's, an estimator cannot answer this kind of
-        question, or a parameter is not one of the estimator's.
+        If a name is unknown, a protocol or split is not one of the task's, an estimator does not support this kind of
+        task, or a parameter is not one of the estimator's.
     """
     cells: dict[Cell, None] = {}
     rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
@@ -122,16 +122,16 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
 
 
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
-    """Return `cells`, followed by cells that probe them for leakage.
+    """Return `cells`, followed by additional cells that probe these cells for leakage.
 
     Every cell, except for baselines of other tasks, is also evaluated under `deployable` with its own split, under
     `first-frame`, and with shuffled rows. A split in time separates no recordings and is not probed; UsageError is
-    raised if there is no other.
+    raised if all cells have such a split.
     """
     if cells and all(cell.split == "in-session" for cell in cells):
         raise UsageError(
-            "There is nothing to probe: a split in time keeps no recordings apart.",
-            hint="Give another --split, or leave --probe out.",
+            "The split in-session cannot be probed: it divides each recording in time.",
+            hint="Give another --split, or leave out --probe.",
         )
     every = dict.fromkeys(cells)
     planned = frozenset(every)
@@ -152,9 +152,9 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
 
 
 def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
-    """Return all combinations of the chosen protocols and splits.
+    """Return all combinations (protocol, split) of the chosen protocols and splits.
 
-    An incompatible combination is refused if it is the only one; among others it becomes a row with the reason.
+    UsageError is raised if no combination is compatible; otherwise incompatible combinations become skipped rows.
     """
     for name in choice.protocol:
         if without_options(name) not in task.protocols and not is_probe(name):
@@ -165,19 +165,19 @@ def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
     if all(not serves(protocol, split) for protocol, split in ways):
         protocol, split = ways[0]
         raise UsageError(
-            f"Protocol {protocol!r} splits by roles only; {split!r} was given.",
-            hint=f"Give --protocol with another of: {', '.join(task.protocols)}.",
+            f"Protocol {protocol!r} allows only the split roles; {split!r} was given.",
+            hint=f"Give another --protocol of the task: {', '.join(task.protocols)}.",
         )
     return ways
 
 
 def serves(protocol: str, split: str | None) -> bool:
-    """Return whether a protocol is compatible with a split."""
+    """Return True if a protocol is compatible with a split."""
     return split in (None, "roles") or not protocol_called(protocol).roles_only
 
 
 def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
-    """Return the splits that a name stands for: ``few-shot`` for all of a task's ``few-shot-N``."""
+    """Return the splits with a name; ``few-shot`` is short for all splits ``few-shot-N`` of a task."""
     few = tuple(name for name in task.splits if shots(name))
     return few if split == "few-shot" and few else (split,)
 
@@ -197,9 +197,9 @@ def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[
         if task.kind not in descriptor.kinds:
             fitting = [other.name for other in registry.estimators if task.kind in other.kinds]
             raise UsageError(
-                f"The estimator {estimator.name!r} does {' and '.join(descriptor.kinds)}; task {task.name!r} is "
+                f"The estimator {estimator.name!r} is for {' and '.join(descriptor.kinds)}; task {task.name!r} is "
                 f"{task.kind}.",
-                hint=f"Estimators for it: {', '.join(fitting)}.",
+                hint=f"Estimators for this task: {', '.join(fitting)}.",
             )
         for parameter in estimator.params:
             if parameter not in descriptor.params:

@@ -1,4 +1,4 @@
-"""Plan of the recordings of cells: those that exist, and those that a rig has to make."""
+"""Planning of the recordings for cells: existing recordings, and recordings to be made by a rig."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.task import ChannelTarget, TaskSpec, in_drawn_order
 
 RequestKey = tuple[str, str, str | None, int]
-"""Sensor, task, split and seed, which determine the recordings of a cell."""
+"""Key (sensor, task, split, seed) that determines the recordings of a cell."""
 
 
 def request_key(cell: Cell) -> RequestKey:
-    """Return the key of a cell's recordings, without a split that its protocol does not support."""
+    """Return the key of a cell's recordings, with None for a split that the protocol does not support."""
     return cell.sensor, cell.task, cell.split if serves(cell.protocol, cell.split) else None, cell.seed
 
 
 def requests_for(
     cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, rig_file: RigFile | None = None
 ) -> dict[RequestKey, list[RecordingRequest]]:
-    """Return the recordings needed, in the campaign's order, with the cells' settings of the simulation.
+    """Return requests for the recordings that cells need, in the order of the campaign, by key.
 
-    Where the campaign leaves the order to be drawn, it is drawn with the cell's seed.
-    Tasks and campaigns with the same scene in the same role share the recording.
+    If the order of a campaign is random, it is drawn with the cell's seed.
+    Tasks and campaigns that have the same scene in the same role share its recording.
     """
     requests: dict[RequestKey, list[RecordingRequest]] = {}
     for cell in cells:
@@ -64,19 +64,19 @@ def requests_for(
 
 
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
-"""Splits that every acquired recording supports, beside the labels of its scene."""
+"""Splits that are possible with every acquired recording, in addition to splits by labels of its scene."""
 
 
 @dataclass
 class RecordingSource:
-    """Where the recordings of some cells come from."""
+    """Source of the recordings of cells: existing files or requests to a rig."""
 
     paths: Sequence[Path]
-    """Paths of the recordings, present or to be made."""
+    """Paths of the recordings, existing or to be made."""
     requests: Sequence[RecordingRequest] = ()
-    """Requests to a rig for those that are missing."""
+    """Requests to a rig for the recordings to be made."""
     trouble: BaseException | None = None
-    """Error that explains why recordings are missing."""
+    """Error that is the reason for missing recordings, or None."""
 
 
 RecordingPlan = dict[RequestKey, RecordingSource]
@@ -84,27 +84,27 @@ RecordingPlan = dict[RequestKey, RecordingSource]
 
 @dataclass(frozen=True)
 class Part:
-    """The tasks of a matrix that are evaluated on one folder of recordings."""
+    """Part of a matrix: the tasks that are evaluated on one folder of recordings."""
 
     matrix: MatrixSpec
     recordings: Path | None
     trouble: TactbenchError | None = None
-    """Error of a data set that could not be fetched or imported."""
+    """Error for a data set that could not be fetched or imported, or None."""
     declared: tuple[DeclaredTask, ...] = ()
-    """Tasks that such a data set declares."""
+    """Tasks declared by a data set that could not be fetched."""
 
 
 def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress) -> list[Part]:
-    """Return `matrix` in parts, one for each data set that its tasks name; what is missing is fetched and imported.
+    """Return `matrix` in parts, one for each data set of its tasks; missing data sets are fetched and imported.
 
-    A data set that cannot be fetched fails its own cells only.
+    If a data set cannot be fetched, only its own cells fail.
 
     Raises
     ------
     TactbenchError
         If no data set can be fetched.
     UnknownNameError
-        If there is no data set of that name.
+        If the name of a data set is unknown.
     """
     from tactbench.core.recording.datasets import dataset_called
 
@@ -132,12 +132,12 @@ def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, pro
 def plan_parts(
     parts: Sequence[Part], registry: Registry, keys: Keys, store: Store, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of all parts, and where their recordings come from; see :func:`plan_run`.
+    """Return the cells of all parts, and the sources of their recordings; see :func:`plan_run`.
 
     Raises
     ------
     UsageError
-        If two parts have a cell in common, and as `plan_run`.
+        If two parts have a cell in common, and for the reasons of `plan_run`.
     """
     cells: dict[str, Cell] = {}
     plan: RecordingPlan = {}
@@ -151,7 +151,7 @@ def plan_parts(
             if cells.setdefault(cell.name, cell) is not cell:
                 raise UsageError(
                     f"{cell.name} is planned for two folders of recordings.",
-                    hint="Run one of them at a time, each with --out.",
+                    hint="Run one folder at a time, each with its own --out.",
                 )
         plan |= own
     return list(cells.values()), plan
@@ -160,14 +160,14 @@ def plan_parts(
 def plan_run(
     part: Part, registry: Registry, keys: Keys, store: Store, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of a matrix, and where their recordings come from.
+    """Return the cells of a part of a matrix, and the sources of their recordings.
 
     Raises
     ------
     UsageError
-        If the matrix names something that does not exist.
+        If a name in the matrix is unknown.
     TactbenchError
-        If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
+        If a rig that is not simulated cannot be built or cannot list its recordings, or a recording cannot be read.
     """
     matrix = part.matrix
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
@@ -181,7 +181,7 @@ def plan_run(
         if paths is not None:
             return _from_replay(matrix, registry, paths, store)
     if not matrix.sensors:
-        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
+        raise UsageError("No sensor is given.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry)
     for cell in cells:
         _check_split(registry.tasks[cell.task].spec, cell.split)
@@ -193,14 +193,14 @@ def plan_run(
         )
     reasons = {str(one.trouble) for one in plan.values()}
     if plan and not rig.simulated and all(one.trouble is not None for one in plan.values()):
-        raise UsageError(f"Nothing is recorded: {'; '.join(sorted(reasons))}", hint="Choose another task or rig.")
+        raise UsageError(f"No task can be recorded: {'; '.join(sorted(reasons))}", hint="Choose another task or rig.")
     return cells, plan
 
 
 def _unanswerable(
     key: RequestKey, registry: Registry, rig: RigDescriptor, file: RigFile | None
 ) -> NotApplicable | None:
-    """Return the reason for which specs rule out a task on a rig of real devices with a sensor, or None."""
+    """Return the reason why a task is impossible with a sensor on a rig of real devices, by their specs, or None."""
     spec, task = registry.sensors[key[0]].spec, registry.tasks[key[1]].spec
     if rig.simulated or rig.references is None:  # a simulated rig raises it itself, at no cost
         return None
@@ -217,21 +217,21 @@ def _unanswerable(
         lacking = names is None or (kind in ("force", "torque") and file is not None and file.force is None)
         if lacking or (names and name is not None and name not in names):
             what = f"{kind} {name or ''}".strip()
-            return NotApplicable(f"Task {task.name!r} asks for {what}; the rig {rig.name} records none.", hint="")
+            return NotApplicable(f"Task {task.name!r} needs {what}; the rig {rig.name} does not record it.", hint="")
     return None
 
 
 def _from_replay(
     matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], store: Store
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of recordings that exist.
+    """Return the cells for existing recordings, and the sources of their recordings.
 
-    A recording of a planned scene serves the campaigns with a scene of this name; one without (an imported table)
-    serves every task. An unreadable recording fails the cells of the sensor after which its folder is named;
-    RecordingError if there is no such sensor.
+    A recording of a planned scene is used for the campaigns with a scene of this name; an imported table without
+    scene, for every task. An unreadable recording fails the cells of the sensor after which its folder is named;
+    RecordingError is raised if there is no such sensor.
     """
     if not paths:
-        raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
+        raise MissingRecordingError("No recordings were found.", hint="Import recordings with `tactbench import`.")
     scenes: dict[str, dict[Path, str | None]] = {}
     broken: dict[str, BaseException] = {}
     for path in paths:
@@ -260,13 +260,13 @@ def _from_replay(
 
 def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:
     return NotApplicable(
-        f"Task {key[1]!r} has no scenes for rig {matrix.rig!r}, and there are no recordings of it.",
+        f"Task {key[1]!r} has no scenes for rig {matrix.rig!r}, and no recordings of the task were given.",
         hint="Use --rig replay --recordings DIR.",
     )
 
 
 def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: RigFile | None) -> list[Path] | None:
-    """Return the recordings of a rig that replays, or None for a rig that records."""
+    """Return the paths of the recordings of a rig that replays, or None for a rig that records."""
     rig = rig_of(name, registry, recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None
@@ -275,7 +275,7 @@ def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: 
 
 
 def _check_split(task: TaskSpec, split: str | None) -> None:
-    """Refuse a split that the recordings of this task's scenes do not support, before any is made."""
+    """Raise UnknownNameError for a split that is impossible with the recordings of the task's scenes."""
     labels = {label for planned in task.scenes for label in planned.scene.labels}
     known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels}
     if split is not None and split not in known and shots(split) is None:

@@ -1,4 +1,4 @@
-"""Module that the fork server imports, to load libraries, estimators and simulated rigs once before it forks."""
+"""Module imported by the fork server, which loads libraries, estimators and simulated rigs once for all workers."""
 
 import gc
 import os

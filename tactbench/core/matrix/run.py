@@ -1,4 +1,4 @@
-"""A run of a matrix: plan, record, evaluate and store its cells."""
+"""Run of a matrix: planning, recording, evaluation and storage of its cells."""
 
 from __future__ import annotations
 
@@ -38,28 +38,28 @@ from tactbench.core.spec.task import TaskSpec
 
 EngineName = Literal["in-process", "isolated", "dask"]
 GRACE_S = 5.0
-"""Seconds for a real rig to stop and close its devices after a timeout."""
+"""Time for a real rig to stop and close its devices after a timeout [s]."""
 
 
 @dataclass(frozen=True)
 class EngineChoice:
-    """Choice of the engine, with its number of processes and its limits."""
+    """Choice of the engine that evaluates cells, with its number of processes and its limits."""
 
     name: EngineName = "isolated"
     jobs: int | None = None
-    """Processes at once; None: one for each usable core."""
+    """Number of parallel processes; None: one for each usable core."""
     limits: Limits = UNLIMITED
 
     @property
     def processes(self) -> int:
-        """Processes at once."""
+        """Number of parallel processes."""
         return self.jobs or usable_cores()
 
     def check(self) -> None:
-        """Raise UsageError if its parts do not go together, or the library of the Dask engine is missing."""
+        """Raise UsageError if engine and number of jobs are incompatible, or the Dask library is missing."""
         if self.name == "in-process" and (self.jobs or 1) > 1:
             raise UsageError(
-                f"The engine in-process carries out one cell at a time; --jobs {self.jobs} was given.",
+                f"The engine in-process evaluates one cell at a time; --jobs {self.jobs} was given.",
                 hint="Leave out --jobs, or use --engine isolated.",
             )
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
@@ -69,7 +69,7 @@ class EngineChoice:
             )
 
     def engine(self, jobs: int) -> Engine:
-        """Return the engine for cells, `jobs` of them at once on this machine."""
+        """Return the engine that evaluates cells, `jobs` at a time on this machine."""
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
 
@@ -77,7 +77,7 @@ class EngineChoice:
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
     def recorder(self, *, computed: bool) -> Engine:
-        """Return the engine for recordings; those of devices are made one at a time, with time to close the devices."""
+        """Return the engine that makes recordings; with devices one at a time, and with time to close the devices."""
         if self.name == "in-process":
             return InProcess()
         return Pool(self.processes, self.limits) if computed else Pool(1, replace(self.limits, grace_s=GRACE_S))
@@ -85,17 +85,17 @@ class EngineChoice:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a run."""
+    """Result of a run: rows of all cells, and numbers of cells computed and recordings made."""
 
     rows: tuple[Row, ...]
     computed: int
-    """Number of cells computed in this run; the others were reused."""
+    """Number of cells computed in this run; all other cells were reused."""
     recorded: int
     """Number of recordings made in this run."""
 
     @property
     def failures(self) -> list[Row]:
-        """Rows of cells that failed."""
+        """Rows of the cells that failed or were stopped."""
         return [row for row in self.rows if row["status"] in STOPPED]
 
 
@@ -109,7 +109,7 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Record and evaluate `matrix`, reusing finished results in `store`.
+    """Record and evaluate the cells of `matrix`, reusing finished results in `store`.
 
     Parameters
     ----------
@@ -118,23 +118,23 @@ def run_matrix(
     store
         Result folder.
     choice
-        Engine, number of processes and limits; scores do not depend on it.
+        Engine, number of processes and limits; scores do not depend on this choice.
     recordings
-        Folder for rigs that replay.
+        Folder of recordings, for rigs that replay.
     root
         Folder of a copy of the data sets that `matrix` names; see
         :meth:`~tactbench.core.recording.datasets.DataSet.recordings`.
     operator
-        Operator of a rig of real devices.
+        Prompts for the operator of a rig of real devices.
     progress
         Display of the progress.
 
     Raises
     ------
     UsageError
-        If the matrix names something that does not exist; nothing is run.
+        If a name in the matrix is unknown; no cell is run.
     FolderError
-        If another run holds the folder, or it cannot be written; finished cells are kept.
+        If the folder is in use by another run or cannot be written; finished cells are kept.
     """
     choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
@@ -156,7 +156,7 @@ def run_matrix(
 
 @dataclass
 class Run:
-    """State of a run: its settings, and the rows so far."""
+    """State of a run: its settings, and the rows of the cells evaluated so far."""
 
     store: Store
     registry: Registry
@@ -170,7 +170,7 @@ class Run:
     recorded: int = 0
 
     def carry_out(self, cells: Sequence[Cell], *, timed: bool) -> None:
-        """Make the missing recordings of `cells`, then evaluate them; timed ones are evaluated one at a time."""
+        """Make the missing recordings of `cells`, then evaluate the cells; timed cells one at a time."""
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
@@ -189,7 +189,7 @@ class Run:
     # Recordings
 
     def _record(self, requests: Sequence[RecordingRequest]) -> None:
-        """Make the recordings that do not exist yet."""
+        """Make the requested recordings that do not exist yet."""
         self._clear(requests)
         missing = {request.path: request for request in requests if not self._is_there(request)}
         if not missing:
@@ -207,7 +207,7 @@ class Run:
             self._clear(requests)  # of an interrupted run, too
 
     def _clear(self, requests: Sequence[RecordingRequest]) -> None:
-        """Remove unfinished files of killed simulations; data of devices are never removed."""
+        """Remove unfinished files of simulations that were killed; data of devices are never removed."""
         computed = {request.path.name for request in requests if is_computed(request)}
         for folder in {request.path.parent for request in requests}:
             for left in folder.glob("*.h5.*"):
@@ -215,7 +215,7 @@ class Run:
                     left.unlink(missing_ok=True)
 
     def _is_there(self, request: RecordingRequest) -> bool:
-        """Return whether a recording exists; a damaged one of a simulation is removed."""
+        """Return True if the requested recording exists; a damaged simulated recording is removed first."""
         if request.path.exists() and is_computed(request):
             try:
                 self.store.about(request.path)
@@ -224,7 +224,7 @@ class Run:
         return request.path.exists()
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
-        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed, sensor and packages."""
+        """Queue recordings: those of a real rig as one piece of work, simulated ones by seed, sensor and packages."""
         pieces: dict[tuple[object, ...], list[RecordingRequest]] = {}
         for request in missing:
             apart = (foreign_components(self.registry, request), request.seed, request.sensor.name) if computed else ()
@@ -255,7 +255,7 @@ class Run:
     # Cells
 
     def _jobs(self, source: RecordingSource, cells: Iterable[Cell]) -> list[Job]:
-        """Return jobs for those of `cells`, which share recordings, that are not finished; the others get their row."""
+        """Return jobs for unfinished `cells`, which share recordings; finished or failed cells get their row."""
         jobs = []
         digests: dict[Path, str] = {}
         for cell in cells:
@@ -280,7 +280,7 @@ class Run:
         return jobs
 
     def _submit_cells(self, engine: Engine, groups: Sequence[Sequence[Job]], at_once: int) -> None:
-        """Queue cells: those of our own estimators that share recordings as one piece, others one estimator a piece."""
+        """Queue cells that share recordings: our own estimators as one piece of work, others one piece for each."""
         work = partial(solve, concurrency=at_once)
         for jobs in groups:
             pieces: dict[object, list[Job]] = {}
@@ -294,7 +294,7 @@ class Run:
     def _ended(
         self, cell: Cell, task: TaskSpec, outcome: Any, key: str = "", sections: Sections | None = None, log: str = ""
     ) -> None:
-        """Store the result of a cell, or the error that stopped it."""
+        """Store the result of a cell, or the error that stopped the cell."""
         if isinstance(outcome, BaseException):
             row, answers = unanswered(cell, task, outcome, simulated=self.registry.rigs[cell.rig].simulated), None
         else:
@@ -305,7 +305,7 @@ class Run:
 
 
 class Recorder:
-    """Makes recordings one after the other; their rig, from `registry`, is built once."""
+    """Function that makes a recording, for use in a worker; the rig is built at the first call."""
 
     def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator
@@ -313,7 +313,7 @@ class Recorder:
         self._registry = registry.with_tasks(Family("task"))  # tasks would be most of the pickled data
 
     def __call__(self, request: RecordingRequest) -> None:
-        """Make a recording; raises whatever the rig raises."""
+        """Make a recording; all errors of the rig are passed on."""
         from tactbench.core.acquisition import acquire
 
         if self._built is None:
@@ -323,7 +323,7 @@ class Recorder:
 
 
 def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
-    """Return the names of effects and of an indenter of other packages that making a recording may import."""
+    """Return the names of the effects and indenter from other packages that are needed for a recording."""
     effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
     shape = str(request.scene.indenter.shape)
     foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
@@ -331,7 +331,7 @@ def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[s
 
 
 def is_computed(request: RecordingRequest) -> bool:
-    """Return whether a recording is computed on this machine, without real devices and wall-clock time."""
+    """Return True if a recording is computed on this machine, without real devices or wall-clock time."""
     simulated, devices = request.rig.simulated, request.rig_file
     if simulated or devices is None:
         return simulated

@@ -1,4 +1,4 @@
-"""Evaluation of one cell: from a job to its row."""
+"""Evaluation of one cell: from a job to its result row."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ _TIMES = ("search_s", "fit_s", "predict_s")
 
 
 class Job(NamedTuple):
-    """A cell to be evaluated, with all the data that its process needs."""
+    """A cell to be evaluated, with all data needed in the process that evaluates it."""
 
     cell: Cell
     task: TaskSpec
     estimator: EstimatorDescriptor
     recordings: tuple[Path, ...]
     digests: tuple[str, ...]
-    """Digests of the recordings' content."""
+    """Content digests of the recordings, in the same order."""
     key: str
     sections: Sections
-    """Sections of the key."""
+    """Sections of the key; see `tactbench.core.matrix.keys`."""
 
 
 def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
-    """Import what an estimator needs and fit it to a few made-up rows, so that no clock counts a first use.
+    """Import the libraries of an estimator and fit it to a few made-up rows, so that times exclude the first use.
 
-    Errors are ignored here; the estimator's cells report them.
+    Errors are ignored, since the estimator's cells will report them.
     """
     if (os.getpid(), estimator.name, kind) in _prepared:
         return
@@ -64,11 +64,11 @@ def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
 
 
 _prepared: set[tuple[int, str, str]] = set()
-"""By process: after a fork, memory pages are copied at first use, which a clock would count."""
+"""Prepared (process, estimator, kind); by process, since memory pages are copied at first use after a fork."""
 
 
 def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplete: bool = False) -> Dataset:
-    """Return the dataset of a task from `recordings`; the last one is kept for the next cell."""
+    """Return the dataset of a task from `recordings`; the last dataset is kept for the next cell."""
     from tactbench.core.evaluation.dataset import load_dataset
 
     wanted = [task, recordings, list(map(signature, recordings)), include_incomplete]
@@ -79,22 +79,22 @@ def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplet
 
 
 _last: list[Any] = []
-"""The last dataset, after what it was made of: task, recordings, states of their files, and `include_incomplete`."""
+"""The last dataset with its origin: [task, recordings, states of the files, `include_incomplete`, dataset]."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]
-"""A row of plain data, and the answers by role."""
+"""Result row of plain data, and the answers by role."""
 
 
 def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) -> Solved:
-    """Evaluate one cell; raises whatever its plugins and recordings raise.
+    """Evaluate one cell; errors of its plugins and recordings are passed on.
 
     Parameters
     ----------
     concurrency
-        Number of pieces of work that the run carries out at the same time.
+        Number of cells that the run evaluates at the same time, for the row.
     own
-        Fields of :class:`CellContext` that replace those of the job, for a caller in Python.
+        Fields of :class:`CellContext` that replace those of the job, for Python callers.
     """
     cell, task, estimator, recordings, *_ = job
     if not own or own["given"] is None:
@@ -134,19 +134,19 @@ def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) 
 
 
 def check_content(job: Job) -> None:
-    """Raise EngineError if recordings in this process differ from those of the run."""
+    """Raise EngineError if the content of a recording differs from that of the run's file at the same path."""
     from tactbench.core.recording.reader import content_digest
 
     for path, digest in zip(job.recordings, job.digests, strict=True):
         if content_digest(path) != digest:
             raise EngineError(
-                f"Host {host_id()} cannot compute this cell: its {path} is another file.",
+                f"Host {host_id()} cannot compute this cell: {path} there differs from the run's file.",
                 hint="Every worker must see the files of the run, unchanged, at the same paths.",
             )
 
 
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
-    """Return a row with every key of the format, filled with what is known before the evaluation."""
+    """Return a row with every key of the format, filled with the values known before the evaluation."""
     of_task = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **dict(RowModel.model_construct(cell=cell.name, status="skipped")),
@@ -162,7 +162,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
 
 
 def published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
-    """Return the published figure to compare the cell with; estimators of other names need their default parameters."""
+    """Return a row's keys on the published score to compare the cell with; empty if none or if `params` are changed."""
     found = task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
     if found is None or (cell.baseline if found.estimator is None else cell.params):
         return {"published": None, "published_reference": "", "published_remark": ""}
@@ -172,7 +172,7 @@ def published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
 
 
 def unanswered(cell: Cell, task: TaskSpec, why: BaseException, *, simulated: bool) -> Row:
-    """Return the row of a cell that was skipped or stopped."""
+    """Return the row of a cell that was skipped or stopped because of the error `why`."""
     error = plain_error(why)
     row = {**opening(cell, task, simulated=simulated), "host": host_id()}
     if isinstance(error, NotApplicable):
@@ -184,7 +184,7 @@ def unanswered(cell: Cell, task: TaskSpec, why: BaseException, *, simulated: boo
 
 
 def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
-    """Return the keys of a row that describe its recordings."""
+    """Return the keys of a result row that describe its recordings."""
     seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
     return {
         "simulated": any(meta.simulated for meta in metas),
@@ -197,7 +197,7 @@ def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
 
 
 def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
-    """Return the assumptions of simulated recordings; where they differ, the range or all values."""
+    """Return the assumptions of simulated recordings by name; differing values as a range or a list."""
     found: dict[str, Scalar] = {}
     for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
         values: list[Any] = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))

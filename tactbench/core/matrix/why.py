@@ -1,4 +1,4 @@
-"""One cell of a result folder: whether a run would reuse it, and its recomputation, bit for bit."""
+"""Examination of a stored cell: reasons why a run would not reuse it, and its recomputation bit for bit."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.progress import Progress
 
 _SHOWN = 8
-"""Number of cells that a message lists."""
+"""Largest number of cells listed in a message."""
 
 
 @dataclass(frozen=True)
 class StoredCell:
-    """A stored cell with its row and the paths of its recordings, whether these exist or not."""
+    """A cell of a result folder with its row and the paths of its recordings, existing or not."""
 
     store: Store
     registry: Registry
@@ -34,15 +34,15 @@ class StoredCell:
     paths: list[Path]
 
     def changes(self) -> tuple[str, list[str]]:
-        """Return the present key of the cell, and sentences that explain why it would not be reused.
+        """Return the cell's key as of now, and sentences with the reasons why a run would not reuse its result.
 
-        The key is empty while recordings are missing. Differences from the stored result come before missing files.
+        The key is empty if recordings are missing. Differences from the stored key come before missing files.
         """
         missing = [path for path in self.paths if not path.exists()]
-        reasons = [] if self.paths else ["there are no recordings of it"]
+        reasons = [] if self.paths else ["there are no recordings of the cell"]
         if missing:
             text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
-            reasons = [f"{text}: they were never made, removed, or are made otherwise now"]
+            reasons = [f"{text}: they were never made, were removed, or have another key now"]
         try:
             digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
             before = self.store.cell(self.row).sections
@@ -56,9 +56,9 @@ class StoredCell:
         return key, [*(differences(before, now) if before else []), *reasons]
 
     def again(self, progress: Progress) -> tuple[Row, list[str], int]:
-        """Recompute the cell in this process, without changing the result folder.
+        """Compute the cell again in this process, without changing the result folder.
 
-        Return the row, sentences about differences from the stored one, and the number of simulated recordings that
+        Return the new row, sentences on differences from the stored row, and the number of simulated recordings that
         were made again in a temporary folder.
         """
         with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
@@ -83,7 +83,7 @@ class StoredCell:
 
 
 def stored_cell(store: Store, given: str) -> StoredCell:
-    """Return the cell of a result folder whose name, or a part of it, is `given`; raises UsageError."""
+    """Return the stored cell whose name contains `given`, see `meant`; raises UsageError if a recording is missing."""
     rows = {row["cell"]: row for row in store.rows()}
     row = rows[meant(given, list(rows))]
     registry, cell = with_declared_of(installed(), [row]), cell_of(row)
@@ -93,22 +93,22 @@ def stored_cell(store: Store, given: str) -> StoredCell:
     for path, file in store.recordings(row):
         if file is None:
             hint = "Run the matrix again with --rig replay --recordings DIR."
-            raise UsageError(f"The recording {path} is not there.", hint=hint)
+            raise UsageError(f"The recording {path} does not exist.", hint=hint)
     return StoredCell(store, registry, cell, row, [file for _, file in store.recordings(row) if file is not None])
 
 
 def meant(given: str, names: Sequence[str]) -> str:
-    """Return the one of `names` that `given` stands for: the name, some of its parts in order, or a piece of it.
+    """Return the name among `names` that matches `given`: the name, some of its parts in order, or a piece of it.
 
-    ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
+    ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` if no other cell has these parts.
 
-    The replicates of a cell differ only in the last part of their names: if all that fit are replicates of one cell,
-    `given` stands for the first of them.
+    The replicates of a cell differ only in the last part of their names: if all matches are replicates of one cell,
+    the first replicate is returned.
 
     Raises
     ------
     UsageError
-        If `given` stands for several cells, which the message lists, or for none.
+        If `given` matches several cells, which the message lists, or no cell.
     """
     if given in names:
         return given
@@ -119,17 +119,17 @@ def meant(given: str, names: Sequence[str]) -> str:
         return min(found, key=_replicate)
     if not found:
         raise UsageError(
-            f"There is no cell called {given!r} among {len(names)}.",
-            hint=did_you_mean(given, names).strip() or "`tactbench leaderboard --format json` has their names.",
+            f"There is no cell called {given!r} among {len(names)} cells.",
+            hint=did_you_mean(given, names).strip() or "`tactbench leaderboard --columns cell` lists the names.",
         )
     more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     raise UsageError(
         f"{given!r} is part of the names of {len(found)} cells.",
-        hint=f"Give more of the name of one: {', '.join(found[:_SHOWN])}{more}.",
+        hint=f"Give more of the name of one cell: {', '.join(found[:_SHOWN])}{more}.",
     )
 
 
 def _replicate(name: str) -> tuple[str, int]:
-    """Return the part of a name that all replicates of a cell share, and the number of the replicate."""
+    """Return the part of a cell's name that all its replicates share, and the seed of the replicate."""
     cell, _, seed = name.rpartition("/")
     return (cell, int(seed)) if seed.isdecimal() else (name, 0)

@@ -1,4 +1,4 @@
-"""The process pool: work in child processes, within limits of time and memory."""
+"""The process pool: carries out work in child processes, within limits of time and memory."""
 
 from tactbench.core.pool.child import UNLIMITED, Limits
 from tactbench.core.pool.pool import Engine, InProcess, Pool, preload

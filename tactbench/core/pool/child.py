@@ -1,4 +1,4 @@
-"""The child process of the pool, which carries out the items of one piece of work in order."""
+"""The child process of the pool, which carries out the items of one piece of work one after the other."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from tactbench.core import errors
 from tactbench.core.errors import OutOfMemory, Raised, TactbenchError, error_text
 
 LOG_BYTES = 2**16
-"""Length of the end of a log that is kept."""
+"""Largest number of bytes kept of a log, from its end."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of one item, a cell or a recording; None means no limit."""
+    """Limits for one item of work (a cell or a recording); None means no limit."""
 
     timeout_s: float | None = None
-    """Seconds of wall time."""
+    """Time limit [s of wall time]."""
     memory_mb: int | None = None
-    """MB (2**20 bytes) beyond what its process holds when the item begins."""
+    """Memory limit [MB of 2**20 bytes], beyond the memory of the process when the item begins."""
     grace_s: float = 0.0
-    """Seconds between SIGTERM and SIGKILL, so that a rig can close its devices."""
+    """Time between SIGTERM and SIGKILL [s], in which a rig can close its devices."""
 
 
 UNLIMITED = Limits()
 
 
 def resident_mb(pid: int) -> float:
-    """Return the resident memory of a process and its descendants, MB; 0 once it has ended."""
+    """Return the resident memory of a process and its descendants [MB of 2**20 bytes]; 0 if it has ended."""
     found = list[int]()
     with suppress(psutil.Error):
         process = psutil.Process(pid)
@@ -60,14 +60,14 @@ def run_child(
     folder: str,
     limits: Limits,
 ) -> None:
-    """Carry out `work` for each item; send the beginning and the result of each through `connection`.
+    """Carry out `work` for each item; send a message at the start of each item, and its result, to `connection`.
 
     Parameters
     ----------
     log
-        File that standard output and standard error are redirected to.
+        Path of the file that standard output and standard error are redirected to.
     folder
-        The working folder of the parent, that relative paths of items start from.
+        Working folder of the parent process, for relative paths in items.
     """
     printed = _redirect(log)
     if hasattr(os, "setsid"):
@@ -97,13 +97,13 @@ def run_child(
 
 
 def end_of(log: int) -> str:
-    """Return the end of the present item's output from the descriptor of its log."""
+    """Return the last `LOG_BYTES` of the present item's output, from the file descriptor `log`."""
     os.lseek(log, max(0, os.fstat(log).st_size - LOG_BYTES), os.SEEK_SET)
     return os.read(log, LOG_BYTES).decode(errors="replace")
 
 
 def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:
-    """Return the kind of outcome, "value" or "error", and the outcome of an item."""
+    """Carry out an item; return "value" and its result, or "error" and the error."""
     if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
         faulthandler.dump_traceback_later(limits.timeout_s)
     try:
@@ -112,7 +112,7 @@ def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[s
         os._exit(0)
     except MemoryError as error:
         where = "".join(traceback.format_exception(error))
-        return "error", OutOfMemory("Memory ran out.", hint="Run fewer at once (--jobs).", traceback_text=where)
+        return "error", OutOfMemory("Memory ran out.", hint="Give a smaller --jobs.", traceback_text=where)
     except BaseException as error:
         return "error", plain_error(error)
     finally:
@@ -132,7 +132,7 @@ def _redirect(log: str) -> int:
 
 
 class _Terminated(BaseException):
-    """The parent sent SIGTERM: contexts are left, so that devices are closed."""
+    """Exception raised on SIGTERM from the parent, so that contexts are left and devices closed."""
 
 
 def _terminate(_number: int, _frame: FrameType | None) -> None:
@@ -140,7 +140,7 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process and its group when the parent has ended, however that happened."""
+    """Wait until the parent process has ended for any reason, then end this process and its group."""
     multiprocessing.parent_process().join()  # type: ignore[union-attr]
     if hasattr(os, "killpg"):
         os.killpg(0, signal.SIGKILL)
@@ -148,7 +148,7 @@ def _end_with_parent() -> None:
 
 
 def plain_error(error: BaseException) -> TactbenchError:
-    """Return an error that can be sent to a process that lacks the classes of plugins."""
+    """Return `error` as a type of tactbench, which can be sent to a process without the plugins' classes."""
     where = "".join(traceback.format_exception(error))
     if isinstance(error, TactbenchError) and getattr(errors, type(error).__name__, None) is type(error):
         error.traceback_text = error.traceback_text or where

@@ -1,4 +1,4 @@
-"""The process pool, in the parent process."""
+"""Engines that carry out work in child processes or in this process: the parent's side of the pool."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from tactbench.core.interrupts import interrupts_held
 from tactbench.core.pool.child import UNLIMITED, Limits, end_of, plain_error, resident_mb, run_child
 
 START_S = 60.0
-"""Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
+"""Time limit for a process to begin with its first item [s]; with `spawn`, libraries are imported before."""
 POLL_S = 0.05
-"""Seconds between two looks at the memory and time of a child."""
+"""Time between two checks of a child's memory and time [s]."""
 KILL_DELAY_S = 0.2
-"""Seconds beyond its time limit after which an item is ended: it writes its stacks at the limit."""
+"""Time between an item's time limit, at which its stacks are logged, and its end by force [s]."""
 MOST_LOG_BYTES = 2**24
-"""A log that grows beyond this is emptied."""
+"""Size [bytes] beyond which a log is emptied."""
 
 
 class Engine:
-    """Carries out pieces of work, each a sequence of items; at the end of its context, waiting pieces are dropped."""
+    """Base of engines that carry out pieces of work (sequences of items); leaving its context drops waiting pieces."""
 
     log = ""
-    """End of the output of the item whose outcome was yielded last."""
+    """Last part of the printed output of the item whose outcome was yielded last."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
@@ -48,7 +48,7 @@ class Engine:
         self._waiting.clear()
 
     def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
-        """Queue a piece of work; may be called while `outcomes` is iterated."""
+        """Queue `work` to be called for each of `items`; may be called while `outcomes` is iterated."""
         self._waiting.append((work, items))
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
@@ -56,14 +56,14 @@ class Engine:
         raise NotImplementedError
 
     def each(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        """Carry out `work` for every item, as one piece, and yield outcomes."""
+        """Carry out `work` for every item, as one piece of work, and yield each item with its outcome."""
         with self:
             self.submit(work, list(items))
             yield from self.outcomes()
 
 
 class InProcess(Engine):
-    """Carries out items in this process, without limits: for a debugger. Ctrl-C ends it."""
+    """Engine that carries out items in this process without limits, for use with a debugger; Ctrl-C ends it."""
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every item with its result or the error that stopped it."""
@@ -78,35 +78,35 @@ class InProcess(Engine):
 
 
 class Pool(Engine):
-    """Up to `jobs` child processes, each for one piece of work, whose items it carries out in order.
+    """Engine of up to `jobs` child processes; each carries out the items of one piece of work in order.
 
-    An item that raises, crashes, hangs or takes too much memory has that error as its outcome; the items after it get a
-    process of their own.
+    If an item raises, crashes, hangs or takes too much memory, its outcome is an error, and further items get a
+    new process.
 
     Parameters
     ----------
     jobs
-        Pieces carried out at the same time.
+        Number of pieces of work carried out at the same time.
     limits
-        What one item may take.
+        Limits of time and memory for one item.
 
     Notes
     -----
-    Processes come from the fork server of `multiprocessing`, or are spawned where there is none or `spawn` is the start
+    Processes come from the fork server of `multiprocessing`, or are spawned if there is none or `spawn` is the start
     method. Work, items and results are pickled; results must be of types of the standard library, numpy or tactbench.
-    A thread of this process watches each child.
+    One thread of this process supervises each child.
     """
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
         super().__init__()
         self.jobs, self.limits = jobs, limits
         self._ended: SimpleQueue[tuple[Any, Any, str] | None] = SimpleQueue()
-        """Item, outcome and log; None marks the end of a piece."""
+        """Queue of (item, outcome, log); None marks the end of a piece of work."""
         self._threads: list[threading.Thread] = []
         self._abandoned = threading.Event()
 
     def __exit__(self, *_: object) -> None:
-        """End every process that is at work."""
+        """End every child process."""
         with interrupts_held():
             super().__exit__()
             self._abandoned.set()
@@ -133,7 +133,7 @@ class Pool(Engine):
                 yield item, outcome
 
     def _carry_out(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
-        """Carry out a piece in one child process after the other, until each of its items has an outcome."""
+        """Carry out a piece of work in one child process after the other, until each of its items has an outcome."""
         left = deque(items)
         try:
             while left and not self._abandoned.is_set():
@@ -156,11 +156,11 @@ _starting = threading.Lock()
 
 
 class _Child:
-    """A child process that carries out items."""
+    """A child process of the pool, seen from the parent process."""
 
     def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
         self.over = False
-        """Whether the process has ended."""
+        """True if the process has ended."""
         self._limits = limits
         context = _context()
         self._connection, theirs = context.Pipe()
@@ -176,7 +176,7 @@ class _Child:
             theirs.close()
 
     def outcome(self, abandoned: threading.Event) -> tuple[Any, str] | None:
-        """Return the result or error of the next item and its log, or None if the pool is being closed."""
+        """Wait for the next item; return its result or error and its log, or None if the pool is being closed."""
         began_s, shared_mb = time.monotonic(), None
         while not abandoned.is_set():
             try:
@@ -197,33 +197,33 @@ class _Child:
         return None
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
-        """Return the error of an item that exceeds its limits, or None."""
+        """Return the error for the present item if it exceeds its limits, else None."""
         if os.fstat(self._log).st_size > MOST_LOG_BYTES:
             os.ftruncate(self._log, 0)
         timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
         if shared_mb is None:  # it has not begun
-            late = Crashed(f"Its process did not begin within {START_S:g} s.", hint="Run fewer at once (--jobs).")
+            late = Crashed(f"The process did not start within {START_S:g} s.", hint="Give a smaller --jobs.")
             return late if spent_s > START_S else None
         if timeout_s is not None and spent_s > timeout_s + KILL_DELAY_S:
-            text = f"It was stopped: it took longer than {timeout_s:g} s."
-            return TimedOut(text, hint="Allow more with --timeout SECONDS.")
+            text = f"Stopped after the time limit of {timeout_s:g} s."
+            return TimedOut(text, hint="Give a larger --timeout SECONDS.")
         if memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb:
-            return OutOfMemory(f"It took more than {memory_mb} MB of memory.", hint="Allow more with --memory MB.")
+            return OutOfMemory(f"Stopped: it used more than {memory_mb} MB of memory.", hint="Give a larger --memory.")
         return None
 
     def _crashed(self) -> Crashed:
         code = self._process.exitcode or 0
         if code >= 0:
-            text = f"Its process ended with exit code {code} and gave no result."
-            return Crashed(text, hint="Something in it calls os._exit or closes what is not its own.")
+            text = f"The process ended with exit code {code} and gave no result."
+            return Crashed(text, hint="A plugin may have called os._exit or closed a file of the process.")
         name = next((one.name for one in signal.Signals if one == -code), "unknown")
-        hint = "What it printed last may say where."
+        hint = "See the last lines of its log."
         if name == "SIGKILL":
-            hint = "If memory was short, run fewer at once (--jobs) or limit each (--memory MB)."
-        return Crashed(f"Its process was ended by signal {-code} ({name}).", hint=hint, signal=-code)
+            hint = "If memory was short, give a smaller --jobs, or a limit with --memory MB."
+        return Crashed(f"The process was ended by signal {-code} ({name}).", hint=hint, signal=-code)
 
     def end(self, *, unfinished: bool) -> None:
-        """End the process and its group; if `unfinished`, after the grace time in which it can close its devices."""
+        """End the process and its group; if `unfinished`, after the grace time, in which devices can be closed."""
         if not self.over:
             self._kill(unfinished=unfinished)
         self._close()
@@ -250,7 +250,7 @@ class _Child:
 
 
 def _with_log(value: Any, log: str, began_s: float) -> tuple[Any, str]:
-    """Return an outcome and its log; an error also carries the log and the stacks that Python's fault handler wrote."""
+    """Return an outcome and its log; an error is given the log and the stacks written by Python's fault handler."""
     if isinstance(value, CellStopped):
         value.log, value.spent_s = log, time.monotonic() - began_s
         marks = [mark for mark in ("Fatal Python error", "Timeout (") if mark in log]
@@ -271,12 +271,12 @@ _preload = ["tactbench.core.pool.child"]
 
 
 def preload(*modules: str) -> None:
-    """Have the fork server import `modules` when it starts, which is when the first process is needed."""
+    """Add `modules` to the modules that the fork server imports when the first child process is started."""
     _preload.extend(name for name in modules if name not in _preload)
 
 
 def _start(start: Callable[[], None]) -> None:
-    """Start a process without importing the main module in it: a script needs no ``__main__`` guard."""
+    """Start a process that does not import the main module, so that scripts need no ``__main__`` guard."""
     main = sys.modules["__main__"]
     with _starting:
         hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}

@@ -1,1 +1,1 @@
-"""Provenance of results: source, versions, machine."""
+"""Provenance of results: digests of source code, versions of software, and the machine."""

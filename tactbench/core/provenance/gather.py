@@ -1,6 +1,6 @@
-"""Provenance: the software and machine of a run, gathered once and summarised below a table.
+"""Provenance of a run: its software and machine, gathered once and summarised below tables.
 
-It holds no clock, no name of a person or host and no path: equal circumstances give equal provenance.
+A provenance contains no time, path, or name of a person or host: equal circumstances give equal provenance.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from tactbench.core.provenance.source import PACKAGE, RELEVANT, source_digest, v
 from tactbench.core.thread_limit import VARIABLES
 
 GIT_S = 10.0
-"""Seconds that git may take to answer: a checkout may lie on a slow network disk."""
+"""Time limit for git [s], as a checkout may be on a slow network disk."""
 
 
 def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
-    """Return versions, machine, state of the code, and the `circumstances` of the run, such as seed and jobs."""
+    """Return versions, machine, commit, plugins, and the `circumstances` of the run, such as seed and engine."""
     return {
         "tactbench": tactbench.__version__,
         "commit": _commit(Path(tactbench.__file__).parent),
@@ -46,20 +46,20 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
 
 
 def usable_cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @lru_cache(maxsize=1)
 def host_id() -> str:
-    """Return a digest that identifies the host without naming it."""
+    """Return a digest of 12 hexadecimal digits that identifies the host without its name."""
     parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
 
 
 @lru_cache(maxsize=1)
 def cpu_model() -> str:
-    """Return the name of the processor."""
+    """Return the model name of the processor, or "unknown"."""
     with suppress(OSError):
         found = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
         if found:
@@ -68,7 +68,7 @@ def cpu_model() -> str:
 
 
 def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
-    """Yield distribution, version, package and source digest of each third-party plugin."""
+    """Yield distribution, version, package and source digest of each package with third-party plugins."""
     packages = {row.module.partition(".")[0]: row for row in registry.plugins}
     for package, row in sorted(packages.items()):
         if package != PACKAGE:
@@ -77,7 +77,7 @@ def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
 
 
 def _commit(folder: Path) -> str:
-    """Return the commit of the git checkout that holds `folder`, with ``+changes`` if files below it differ from it."""
+    """Return the git commit of the checkout that contains `folder`, with ``+changes`` if files differ from it."""
     command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
     try:
         found = subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=True)
@@ -87,7 +87,7 @@ def _commit(folder: Path) -> str:
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences about software and machines of several provenances, each once; empty ones are skipped."""
+    """Return sentences on the software and machines of several provenances, without repetitions."""
     return tuple(dict.fromkeys(text for one in filter(None, several) for text in _sentences(one)))
 
 

@@ -1,4 +1,4 @@
-"""Digests of the source code of packages that take part in a recording or an answer."""
+"""Digests of the source code of packages that can affect a recording or an answer."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from typing import Any
 
 PACKAGE = "tactbench"
 RELEVANT = ("numpy", "scipy", "scikit-learn")
-"""Distributions whose version may change a number in any cell."""
+"""Distributions whose version may change the result of any cell."""
 
 _BOTH = ("core/spec", "core/recording", "core/samples", "core/plugins", "core/thread_limit")
 ANSWERING = (*_BOTH, "core/evaluation", "core/events", "core/statistics", "core/matrix/solve", "tasks", "estimators")
-"""Sub-packages of tactbench that take part in every answer. Those that record do not: recordings count by content."""
+"""Parts of tactbench that can affect every answer; code for recording is not included, as recordings have digests."""
 RECORDING = (*_BOTH, "core/acquisition", "links", "devices")
-"""Sub-packages of tactbench that take part in every recording, beside those of the sensor and the rig."""
+"""Parts of tactbench that can affect every recording, in addition to those of the sensor and the rig."""
 
 
 @lru_cache(maxsize=256)
 def source_digest(package: str, below: str = "") -> str:
-    """Return the digest of the files of an importable package, or of one module or sub-package `below` it.
+    """Return the digest of all files of an importable package, or of the module or sub-package `below` in it.
 
-    Every file counts by its place and bytes, tables and compiled modules among them; byte code and hidden files do not,
-    nor verbs and checks of tactbench, which take part in nothing. Nothing is imported. A package without a folder or
+    Every file counts with its path and bytes, tables and compiled modules included, except for byte code, hidden files
+    and the commands and checks of tactbench, which affect no result. Nothing is imported. A package without a folder or
     file on disk has the digest of its name.
     """
     sha = hashlib.sha256(f"{package} {below}".encode())
@@ -46,15 +46,15 @@ def source_digest(package: str, below: str = "") -> str:
 
 
 def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
-    """Return digests by package: the sub-packages `own` of tactbench, and what holds each of `modules`.
+    """Return source digests by name: of the parts `own` of tactbench, and of the packages of `modules`.
 
     Parameters
     ----------
     modules
-        ``package.module`` or ``package.module:attribute``. Of tactbench the sub-package of two levels counts, such as
-        ``rigs/twin``; of any other package the whole of it.
+        ``package.module`` or ``package.module:attribute``. In tactbench a sub-package of two levels counts, such as
+        ``rigs/twin``; elsewhere the whole package.
     own
-        Places in tactbench, such as ``core/spec``.
+        Paths in tactbench, such as ``core/spec``.
     """
     places = {(PACKAGE, place) for place in own}
     for module in modules:
@@ -70,7 +70,7 @@ def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
 
 @lru_cache(maxsize=64)
 def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
-    """Return the versions of Python, of `RELEVANT` and of the distributions `more`."""
+    """Return the versions of Python, numpy, scipy, scikit-learn and the distributions `more`, by name."""
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
     return found | {name: version_of(name) for name in (*RELEVANT, *more)}
 
@@ -84,23 +84,23 @@ def version_of(distribution: str) -> str:
 
 
 def digest_of(text: str) -> str:
-    """Return the digest of a text for a key or an identifier: 32 hexadecimal digits."""
+    """Return the digest of a text, for a key or an identifier, as 32 hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def identity_of(value: Any) -> dict[str, Any]:
-    """Return the digest of an object's attributes, with versions and sources of the code that it uses.
+    """Return the digest of an object's attributes, with versions and source digests of the code of its classes.
 
     Parameters
     ----------
     value
-        Estimators, functions, arrays or plain data. The version of an installed distribution stands for the source of
-        its classes, the file of a script for those of the script, and all files of any other package for its own.
+        Estimators, functions, arrays or plain data. Code is identified by version for classes of an installed
+        distribution, by the file for classes of a script, and by all files of the package otherwise.
 
     Raises
     ------
     ValueError
-        If the source cannot be determined: of lambdas, and of objects defined in a notebook or a function.
+        If the source cannot be determined, as for lambdas, and for objects defined in a notebook or a function.
     """
     import joblib
 
@@ -123,5 +123,5 @@ def identity_of(value: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _distributions() -> Mapping[str, list[str]]:
-    """Return the distributions that provide each importable package."""
+    """Return the names of the installed distributions that provide each importable package, by package."""
     return importlib.metadata.packages_distributions()

@@ -1,1 +1,1 @@
-"""The paper's tables and figures, and one page with all of them, from stored results."""
+"""The report: tables and figures as in the paper, and one HTML page with all of these, from stored results."""

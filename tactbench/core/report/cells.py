@@ -1,4 +1,4 @@
-"""Collects everything that is known about a cell, for the page."""
+"""Details of a cell for the report: the values of its row, and the scores of its recordings."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _GROUPS = {
     **dict.fromkeys(Cost.model_fields, "Times and memory"),
     **dict.fromkeys(RestsOn.model_fields, "What it rests on"),
 }
-"""Titles of groups of values, by key."""
+"""Title of the group of values that a key of a row belongs to."""
 
 
 def details(row: Row, tested: Answers | None) -> Details:
-    """Return the values of a cell's row that are not empty, by their keys, and the scores of its recordings."""
+    """Return the values of a cell's row that are not empty, in titled groups, and the scores of its recordings."""
     known = {name: value for name, value in row.items() if name != "digests" and value not in (None, "", [], {}, ())}
     texts: dict[str, str] = {name: str(known.pop(name)) for name in ("traceback", "log") if name in known}
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
@@ -48,9 +48,9 @@ def details(row: Row, tested: Answers | None) -> Details:
 
 
 def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
-    """Return name, number of rows, metric and score of each test recording of a cell; of events none.
+    """Return name, number of rows, metric and score of each test recording of a cell; empty for event metrics.
 
-    The metric of classes is the accuracy, since a recording may hold one class.
+    For classifications the metric is the accuracy, since a recording may hold a single class.
     """
     metric = METRICS.get(str(row["metric"]).removeprefix(TRUE))
     if tested is None or metric is None or metric.kind == "events":

@@ -1,4 +1,4 @@
-"""Comparison of sensors: the rows of the paper's Table I, data sheets and parameters, with their sources."""
+"""Comparison of sensors: rows as in the paper's Table I, data sheets and parameters, with their sources."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from tactbench.core.tables.text_table import TextTable
 
 ABSENT = "-"
 UNKNOWN = "unknown"
-"""Text for a fact that every device has and that no source states."""
+"""Text for a property, such as the mass of a device, that no source states."""
 OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
-"""Fields of a data sheet, in the order in which they are shown."""
+"""Fields of a sensor's data sheet, in the order of the table."""
 
 # Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
 _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
@@ -26,7 +26,7 @@ _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
 
 
 class Fact(NamedTuple):
-    """One field of the comparison: a text, with the tag and the reference of its source."""
+    """One field of a comparison of sensors: a text, with the tag and the reference of its source."""
 
     text: str
     tag: str = ""
@@ -34,11 +34,11 @@ class Fact(NamedTuple):
 
 
 Comparison = dict[str, list[Fact]]
-"""Rows of a comparison by title: one fact for each sensor."""
+"""Rows of a comparison of sensors by title, with one fact for each sensor."""
 
 
 def table_one(sensors: Sequence[SensorSpec]) -> Comparison:
-    """Return the rows of the paper's Table I for any sensors."""
+    """Return the rows of the paper's Table I (taxels, principle, ranges and bandwidths) for `sensors`."""
     found = {
         "# taxels": list(map(_number_of_taxels, sensors)),
         "measurement principle": [_fact(sensor.principle, sensor.principle_source) for sensor in sensors],
@@ -47,25 +47,25 @@ def table_one(sensors: Sequence[SensorSpec]) -> Comparison:
 
 
 def data_sheets(sensors: Sequence[SensorSpec]) -> Comparison:
-    """Return the sensors as devices: range, size, mass, interface, power, availability."""
+    """Return the properties of the sensors as devices: force range, size, mass, interface, power, availability."""
     return {name.replace("_", " "): [_of_device(sensor, name) for sensor in sensors] for name in OF_DEVICES}
 
 
 def readings(sensors: Sequence[SensorSpec]) -> Comparison:
-    """Return the facts about readings: clocks, delay, range of a converter."""
+    """Return the properties of the sensors' readings: streams with their rates, delay, range of the converter."""
     rows = {"streams": _streams, "delay of a reading": _delay, "taxel reading": _reading}
     return {title: list(map(row, sensors)) for title, row in rows.items()}
 
 
 def quantities(sensors: Sequence[SensorSpec]) -> Comparison:
-    """Return every quantity that the specs state: skin, parameters, noise, nuisances."""
+    """Return every quantity that the sensors' specs state: skin, parameters, noise, nuisances."""
     tables = list(map(_quantities, sensors))
     titles = dict.fromkeys(title for table in tables for title in table)
     return {title: [_sourced(table.get(title)) for table in tables] for title in titles}
 
 
 def sensor_table(title: str, sensors: Sequence[SensorSpec], rows: Comparison, *, with_source: bool) -> TextTable:
-    """Return a comparison as a table with a column for each sensor, and one for its sources if `with_source`."""
+    """Return a comparison as a table with a column for each sensor, and a column for its sources if `with_source`."""
     columns = [name for one in sensors for name in (one.title, *([f"{one.title}: source"] if with_source else []))]
     lines = []
     for name, facts in rows.items():
@@ -111,7 +111,7 @@ def _streams(sensor: SensorSpec) -> Fact:
 
 
 def _delay(sensor: SensorSpec) -> Fact:
-    """Return the sensor's own parts of an answer's delay: the interval of each stream, and the link."""
+    """Return the parts of an answer's delay due to the sensor: sampling interval of each stream, and link delay."""
     parts = [f"{stream.name} {1e3 / stream.rate_hz:.3g} ms" for stream in sensor.streams if stream.rate_hz]
     sampling = f"sampling interval {', '.join(parts) or 'not stated'}"
     link = sensor.link_delay

@@ -1,4 +1,4 @@
-"""Makes the page: sections in order, in one HTML file that loads nothing."""
+"""The report page: one HTML file with all sections, without external files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 
 def answers_section(results: Results) -> Section:
-    """Return the first section: the outcome of each block, and published scores and ours in one picture."""
+    """Return the first section: the outcome of each leaderboard, and a figure of published scores and ours."""
     verdicts = [
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
         for one in results.leaderboard.blocks
@@ -55,32 +55,32 @@ def answers_section(results: Results) -> Section:
 
 
 def leaderboards_section(results: Results) -> Section:
-    """Return the section of leaderboards, with failed and skipped cells and their reasons."""
+    """Return the section of leaderboards, with the reasons of failed and skipped cells."""
     view = View(columns=(*DEFAULT, REASON))
     tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in results.leaderboard.blocks)
     return Section(paragraphs=("A number leads to the details of its cell.",), tables=tables)
 
 
 def published_section(results: Results) -> Section:
-    """Return the section of published numbers."""
+    """Return the section with the table of published scores and ours."""
     table = published_table(results.registry, results.rows)
     return Section(tables=(table,) if table.lines else ())
 
 
 def figures_section(results: Results) -> Section:
-    """Return the section of the figures that were drawn for this page."""
+    """Return the section of figures, except for the figure of published scores in the first section."""
     pictures = tuple(one for one in results.drawn if one.name != PUBLISHED)
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
     return Section(paragraphs=paragraphs, pictures=pictures, missing=results.undrawn)
 
 
 def compared_section(results: Results) -> Section:
-    """Return the tables below the leaderboard: events and probes."""
+    """Return the section of tables on events and leakage probes."""
     return Section(tables=tuple(table.compact() for table in results.leaderboard.sections))
 
 
 def costs_section(results: Results) -> Section:
-    """Return the section of the files that `tactbench cost` has written."""
+    """Return the section of accuracy against time, from files written by `tactbench cost`."""
     folder = results.store.folder / "cost"
     tables = []
     for path in sorted(folder.glob("*.json")):
@@ -92,13 +92,13 @@ def costs_section(results: Results) -> Section:
 
 
 def assumptions_section(results: Results) -> Section:
-    """Return the section of what `tactbench sensitivity` has computed."""
+    """Return the section of sensitivities to assumptions, as computed by `tactbench sensitivity`."""
     specs = {sensor.name: sensor.spec for sensor in results.registry.sensors}
     return Section(tables=tuple(sensitivity_tables(results.store, specs)))
 
 
 def sensors_section(results: Results) -> Section:
-    """Return the comparison of the sensors of the results."""
+    """Return the section that compares the sensors of the results."""
     known = results.registry.sensors
     names = list(dict.fromkeys(str(row["sensor"]) for row in results.rows))
     missing = tuple(f"{name}: not installed." for name in names if name not in known)
@@ -115,7 +115,7 @@ def sensors_section(results: Results) -> Section:
 
 
 def cells_section(results: Results) -> Section:
-    """Return the details of every cell of the leaderboard."""
+    """Return the section with the details of every cell of the leaderboard, unless there are too many."""
     if not results.anchors:
         return Section(paragraphs=(f"These are more than {MOST_CELLS} cells: `tactbench why CELL` has their details.",))
     several = any(row["repeats"] > 1 for row in results.rows)
@@ -126,7 +126,7 @@ def cells_section(results: Results) -> Section:
 
 
 def about_section(results: Results) -> Section:
-    """Return the number of cells of each status, and the versions, machine and commit of the runs."""
+    """Return the section with the number of cells by status, and versions, machine and commit of the runs."""
     counts = Counter(str(row["status"]) for row in results.rows)
     statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     return Section(paragraphs=(f"Cells: {statuses}.", *results.leaderboard.footer))
@@ -144,7 +144,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("cells", "Details of each cell", cells_section),
     ("about", "Made by", about_section),
 )
-"""Anchor, title and maker of each section."""
+"""Anchor, title and function of each section of the page."""
 
 
 FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
@@ -152,20 +152,20 @@ FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
     "vector": (residuals,),
     "classification": (confusion, embedding),
 }
-"""Figures by kind of task, in the order of a report; NotApplicable is raised for a group that has no such figure."""
+"""Drawing functions by kind of task; they raise NotApplicable for a group that cannot have the figure."""
 
 
 def draw_figures(
     results: Results, folder: Path, progress: Progress, remark: Callable[[str], None]
 ) -> list[SavedFigure]:
-    """Draw every figure that the results allow and save it into `folder` as PDF and PNG.
+    """Draw every figure that the results permit and save it into `folder` as PDF and PNG.
 
-    `remark` is called with a sentence on each figure that is left out.
+    `remark` is called with a sentence on each figure that cannot be drawn.
 
     Returns
     -------
     list of SavedFigure
-        In the order of a report: published scores and ours, then by group of comparable cells.
+        Figures in the order of the report: published scores and ours, then by group of comparable cells.
     """
     work: list[tuple[str, Callable[[], Sketch | None]]] = []
     for group in groups(results, remark):
@@ -191,19 +191,19 @@ def draw_figures(
 
 
 class Page(NamedTuple):
-    """The HTML of a page, and the parts that it lacks."""
+    """The HTML of a report page, and the parts that it lacks."""
 
     html: str
     missing: tuple[str, ...]
-    """A sentence for each part that a section lacks."""
+    """One sentence for each missing part of a section."""
     broken: tuple[str, ...]
-    """A sentence for each section that could not be made although its results exist."""
+    """One sentence for each section whose results exist and could not be shown."""
 
 
 def make_page(results: Results) -> Page:
-    """Return the page; the same results give the same bytes. Empty sections are left out.
+    """Return the report page; equal results give equal bytes. Empty sections are left out.
 
-    A section that cannot be made is replaced by the reason.
+    A section that cannot be made is replaced by a sentence with the reason.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -233,19 +233,19 @@ def make_page(results: Results) -> Page:
 
 
 def make_report(results: Results, out: Path, progress: Progress) -> Page:
-    """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
+    """Draw the figures and write the report: ``index.html`` and ``figures/`` in `out`.
 
     Raises
     ------
     UsageError
         If no cell has finished.
     UnwritableError
-        If `out` cannot be written; an earlier page is then still whole.
+        If `out` cannot be written; an earlier page then stays complete.
     """
     if not any(row["status"] == "done" for row in results.rows):
         raise UsageError(
             f"No cell in {results.store.folder} has finished: there is nothing to report.",
-            hint="Finish some with `tactbench run --out DIR`.",
+            hint="Compute results with `tactbench run --out DIR`.",
         )
     undrawn: list[str] = []
     with writable(out):

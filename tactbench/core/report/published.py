@@ -1,4 +1,4 @@
-"""Compares published numbers with our scores."""
+"""Comparison of published scores with ours."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ COLUMNS = ("number", "published", "ours", "interval", "ours − published", "ver
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A published number, and a row of ours that is comparable with it."""
+    """A published score, and a comparable row of our results."""
 
     task: TaskSpec
     published: Published
     row: Row
     verdict: Verdict
-    """`inside`: the published number lies in the interval of our score; `no interval`: too few replicates have one."""
+    """`inside`: the published score lies in the interval of ours; `no interval`: too few replicates for an interval."""
     reason: str = ""
-    """Reason why our row has no score."""
+    """Reason why our row has no score; empty if it has a score."""
 
     @property
     def title(self) -> str:
-        """Return the published title, with our sensor and estimator where the publication names none."""
+        """Title of the published score, with our sensor and estimator where the publication does not state them."""
         title = self.published.title or f"{self.task.name}, {self.task.metric}"
         ours = [str(self.row[key]) for key in ("sensor", "estimator") if getattr(self.published, key) is None]
         return f"{title} ({', '.join(ours)})" if ours else title
 
 
 def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
-    """Return a line for each published number and each comparable row, tasks in the order of the rows."""
+    """Return one comparison for each published score and comparable row, tasks in the order of the rows."""
     rows = list(map(against_reference, rows))
     tasks = [registry.tasks[name].spec for name in dict.fromkeys(row["task"] for row in rows) if name in registry.tasks]
     return [
@@ -51,7 +51,7 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
 
 
 def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
-    """Return whether `row` is comparable with a published number."""
+    """Return True if `row` is comparable with a published score."""
     if row["task"] != task.name or row["params"] or (published.estimator is None and row["is_baseline"]):
         return False
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
@@ -67,7 +67,7 @@ def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
 
 
 def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
-    """Return the table of published numbers and ours."""
+    """Return the table of published scores, ours, and their differences."""
     lines = reproduce(registry, rows)
     titles: dict[str, dict[str, None]] = {}
     for line in lines:

@@ -1,4 +1,4 @@
-"""The parts of a report: finished cells, their answers and recordings, figures and sections."""
+"""Data of a report: result rows with their answers and recordings, figures and sections."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ if TYPE_CHECKING:
 
 
 MOST_CELLS = 500
-"""A page of more cells has no details: each cell takes reading a file and 20 kB."""
+"""Largest number of cells whose details a page shows; each takes 20 kB and the reading of a file."""
 
 
 @dataclass(frozen=True)
 class SavedFigure:
-    """A figure that has been saved."""
+    """A figure saved as PNG and PDF, with title and caption."""
 
     name: str
-    """Short, fit for a file name and an anchor: ``force-against-time``."""
+    """Short name for files and anchors, such as ``force-against-time``."""
     title: str
-    """The question that it answers."""
+    """Heading: the question that the figure answers."""
     caption: str
-    """Description of axes and marks, in sentences that a paper could use."""
+    """Description of axes and marks, in complete sentences as for a paper."""
     png: Path
-    """Path of the picture; the PDF lies beside it."""
+    """Path of the PNG file; the PDF has the same path with another suffix."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """A result folder, opened for reading.
+    """The results of a folder, opened for reading, with the figures drawn from them.
 
     Parameters
     ----------
     registry
-        Where specs of sensors and tasks are looked up.
+        Registry with the specs of sensors and tasks.
     rows
-        One a cell, the latest of each name.
+        One row for each cell, over its replicates.
     replicates
-        The rows as they are stored, one a cell and replicate, by key.
+        The stored rows, one for each cell and replicate, by key.
     drawn
-        The figures of these results.
+        Figures drawn from these results.
     """
 
     store: Store
@@ -59,48 +59,48 @@ class Results:
     replicates: Mapping[str, Row] = field(default_factory=dict)
     drawn: tuple[SavedFigure, ...] = ()
     undrawn: tuple[str, ...] = ()
-    """One sentence for each figure that could not be made."""
+    """One sentence for each figure that could not be drawn."""
 
     @cached_property
     def leaderboard(self) -> Table:
-        """Return the rows as ranked tables."""
+        """The rows arranged as ranked tables."""
         return table_of(self.store, self.rows)
 
     @cached_property
     def anchors(self) -> dict[str, str]:
-        """Return the anchor of the details of each cell, by the cell's name; none of too many cells."""
+        """HTML anchor of each cell's details, by name of the cell; empty for more than `MOST_CELLS` cells."""
         lines = self.leaderboard.lines if len(self.rows) <= MOST_CELLS else ()
         return {str(line.row["cell"]): f"cell-{place}" for place, line in enumerate(lines, 1)}
 
     def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
-        """Return the answers of a cell by role; empty if it did not finish."""
+        """Return the answers of a cell by role; empty if the cell did not finish."""
         return self.store.answers(str(row["key"]))
 
     def replicate(self, row: Row) -> Row:
-        """Return the row of the replicate whose answers are stored for a cell, with the number of replicates."""
+        """Return the row of the replicate whose answers represent a cell, with the cell's number of replicates."""
         return {**self.replicates.get(str(row["key"]), row), "repeats": row["repeats"]}
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
-        """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
+        """Return the paths of a cell's recordings; ``Answers.recording`` is an index into this list.
 
         Raises
         ------
         DataError
-            If one is not there.
+            If a recording does not exist.
         """
         found = []
         for path, recording in self.store.recordings(row):
             if recording is None:
                 raise DataError(
-                    f"The recording {path} that {row['cell']} was answered from is not there.",
-                    hint="Put it back, or run the cell again.",
+                    f"The recording {path}, on which {row['cell']} was evaluated, does not exist.",
+                    hint="Put the file back, or run the cell again.",
                 )
             found.append(recording)
         return found
 
 
 def open_results(store: Store, registry: Registry) -> Results:
-    """Return the results of `store`: one row for each cell."""
+    """Return the results of the folder `store`, with the registry of its sensors and tasks."""
     rows = store.rows()
     shown = tuple(over_all(store, rows))
     return Results(store, with_declared_of(registry, shown), shown, {str(row["key"]): row for row in rows})
@@ -108,20 +108,20 @@ def open_results(store: Store, registry: Registry) -> Results:
 
 @dataclass(frozen=True)
 class Details:
-    """Everything that is known about one cell."""
+    """Details of one cell for the report page."""
 
     cell: str
     status: str
     pairs: Mapping[str, Mapping[str, str]]
-    """Titled lists of names and values."""
+    """Names and values, by title of their group."""
     tables: tuple[TextTable, ...]
     texts: Mapping[str, str]
-    """Titled texts of many lines."""
+    """Texts of many lines, such as a log, by title."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page. Text between backticks is shown as code; none of it is markup."""
+    """A section of the report page. Text between backticks is shown as code; other markup is escaped."""
 
     anchor: str = ""
     title: str = ""
@@ -130,4 +130,4 @@ class Section:
     pictures: tuple[SavedFigure, ...] = ()
     details: tuple[Details, ...] = ()
     missing: tuple[str, ...] = ()
-    """One sentence for each thing that the section lacks."""
+    """One sentence for each missing part of the section."""

@@ -1,1 +1,1 @@
-"""One run, described by options, for the verbs and for the functions of Python."""
+"""A benchmark run described by options, as used by the command line and by the Python functions."""

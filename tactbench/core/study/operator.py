@@ -1,4 +1,4 @@
-"""Prompts on stderr for the operator of a rig, who answers with Enter."""
+"""Prompts on stderr for the person who operates a rig, confirmed with Enter."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tactbench.core.tables.terminal import remark
 
 
 class TerminalOperator:
-    """An operator at the terminal (:class:`~tactbench.core.plugins.interfaces.Operator`).
+    """Prompts for an operator at the terminal (:class:`~tactbench.core.plugins.interfaces.Operator`).
 
     Parameters
     ----------
     yes
-        Show prompts without waiting, as all steps are done already (``--yes``).
+        Show prompts without waiting for Enter, if all steps are done already (``--yes``).
     paused
-        Context of a prompt, in which nothing else draws on the terminal: ``LiveView.paused``.
+        Function that returns the context of a prompt, in which no other output is drawn: ``LiveView.paused``.
     """
 
     def __init__(self, *, yes: bool = False, paused: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:
@@ -26,7 +26,7 @@ class TerminalOperator:
         self._paused = paused
 
     def prompt(self, text: str) -> None:
-        """Show `text` and wait for Enter; keys pressed before do not count.
+        """Show `text` and wait for Enter; keys pressed before the prompt are ignored.
 
         Raises
         ------
@@ -38,18 +38,18 @@ class TerminalOperator:
             return
         if not sys.stdin.isatty():
             raise RigError(
-                f"A step cannot be confirmed, as stdin is no terminal: {text}",
-                hint="Run it in a terminal, or add --yes if all steps are done already.",
+                f"A step cannot be confirmed, as stdin is not a terminal: {text}",
+                hint="Run the command in a terminal, or add --yes if all steps are done already.",
             )
         with self._paused():
             _drop_input()
-            remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
+            remark(f"{text}\nPress Enter when this is done, Ctrl-C to end.")
             if not sys.stdin.readline():
                 raise RigError("The step was not confirmed: stdin was closed.", hint="Press Enter when it is done.")
 
 
 def _drop_input() -> None:
-    """Discard input that was typed before, where the system can."""
+    """Discard keys typed before a prompt, on systems with termios."""
     try:
         import termios
     except ImportError:  # Windows

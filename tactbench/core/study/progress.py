@@ -1,4 +1,4 @@
-"""Progress of a long run: a bar on a terminal, elsewhere a line for each finished tenth."""
+"""Progress of a long run: a progress bar on a terminal, otherwise one line for each finished tenth."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tactbench.core.progress import Progress
 from tactbench.core.tables.terminal import remark
 
 _FEW = 10
-"""Stages of at most so many steps show no remaining time: fits of a forest and a mean differ by orders of magnitude."""
+"""Largest number of steps of a stage that shows no remaining time, since single steps differ by orders of magnitude."""
 
 
 @contextmanager
 def progress() -> Iterator[Progress]:
-    """Show progress on stderr."""
+    """Return a context whose value shows progress on stderr."""
     if not sys.stderr.isatty():
         yield _Lines()
         return
@@ -31,7 +31,7 @@ def progress() -> Iterator[Progress]:
 
 
 class _Lines(Progress):
-    """Prints one line for each stage and for each finished tenth of it, for logs."""
+    """Progress for logs: one line for each stage and for each finished tenth of a stage."""
 
     def begin(self, stage: str, total: int) -> None:
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
@@ -46,7 +46,7 @@ class _Lines(Progress):
 
 
 class _Bar(Progress):
-    """Shows a bar for each stage on a terminal."""
+    """Progress on a terminal: a progress bar for each stage."""
 
     def __init__(self, terminal: TextIO) -> None:
         self._terminal = terminal
@@ -88,7 +88,7 @@ class _Bar(Progress):
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Hide the bar inside of the context."""
+        """Return a context in which the progress bar is hidden."""
         shown = self._shown
         if shown is not None:
             shown.stop()

@@ -1,4 +1,4 @@
-"""Opens result folders, and reports files that cannot be read."""
+"""Functions that open result folders and report files that cannot be read."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from tactbench.core.tables.terminal import remark
 
 
 def is_results(folder: Path) -> bool:
-    """Return whether a folder holds cells that have ended."""
+    """Return True if a folder contains the file of at least one cell."""
     return any((folder / "cells").glob("*.h5"))
 
 
 def opened(folder: Path) -> Store:
-    """Return a result folder; raises UsageError if there is none."""
+    """Return the store of a result folder; raises UsageError if the folder contains no results."""
     if not is_results(folder):
-        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
+        raise UsageError(f"There are no results in {folder}.", hint="Compute results with `tactbench run --out DIR`.")
     return Store(folder)
 
 
 def shown_rows(store: Store) -> list[Row]:
-    """Return a row for each cell of a folder, and report unreadable files; raises UsageError if no row is left."""
+    """Return one row for each cell of a folder and report unreadable files; raises UsageError if no row can be read."""
     rows = store.rows()
     for one in store.troubles:
         remark(f"Left out: {one}")
     if not rows:
-        raise UsageError(f"{store.folder} has no row that can be shown.", hint="Run `tactbench run` again.")
+        raise UsageError(f"No result in {store.folder} can be read.", hint="Run `tactbench run` again.")
     return over_all(store, rows)

@@ -1,4 +1,4 @@
-"""Builds the scene that ``record --indenter`` and ``--profile`` describe."""
+"""Construction of the scene described by the options ``--indenter`` and ``--profile`` of ``tactbench record``."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _BY = "the command line"
 
 
 def scene_of(registry: Registry, sensor: SensorDescriptor, indenter: str | None, profile: str | None) -> Scene:
-    """Return a press with the indenter and force profile given; by default those of the paper.
+    """Return the scene of one press with the given indenter and force profile; by default those of the paper.
 
     Raises
     ------
     UnknownNameError
-        If no such shape or profile is installed.
+        If no shape or profile of the given name is installed.
     UsageError
-        If a dimension or parameter is none of its own, no number, or out of its range.
+        If a dimension or parameter is unknown, not a number, or out of its range.
     """
     pressed = Indenter() if indenter is None else _indenter(registry, indenter)
     labels: dict[str, str | float | int] = {}
@@ -43,7 +43,7 @@ def scene_of(registry: Registry, sensor: SensorDescriptor, indenter: str | None,
 
 
 def _indenter(registry: Registry, text: str) -> Indenter:
-    """Return an indenter with every dimension of its shape."""
+    """Return the indenter described by `text`, with a value for every dimension of its shape."""
     name, given = _named(text)
     descriptor = registry.indenters[name]
     turned = {"angle": sourced(given.pop("angle"), "deg", _BY)} if "angle" in given else {}
@@ -65,7 +65,7 @@ def _profile(registry: Registry, text: str) -> ForceProfile:
         if parameter not in ("force", "duration"):
             raise UnknownNameError("parameter of the ramp", parameter, ("force", "duration"))
         if not value > 0:
-            raise UsageError(f"{parameter} of the ramp is {value:g}.", hint="Give a number above 0.")
+            raise UsageError(f"{parameter} of the ramp must be above 0, not {value:g}.", hint="Give a number above 0.")
     change: dict[str, Any] = {"end": sourced(given["force"], "N", _BY)} if "force" in given else {}
     if "duration" in given:
         share = given["duration"] / ramp.duration.to("s")
@@ -76,7 +76,7 @@ def _profile(registry: Registry, text: str) -> ForceProfile:
 
 
 def _named(text: str) -> tuple[str, dict[str, float]]:
-    """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError for a value that is no number."""
+    """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError for a value that is not a number."""
     name, _, rest = text.partition(":")
     given: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
@@ -85,14 +85,14 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
             given[field.strip()] = TypeAdapter(FiniteFloat).validate_python(number)
         except ValueError as error:
             raise UsageError(
-                f"{field.strip()} of {name!r} is given as {number!r}, and a number is expected.",
-                hint="Write it as radius=4; `tactbench show` with the name shows the units.",
+                f"{field.strip()} of {name!r} is given as {number!r}; a finite number is expected.",
+                hint=f"Write, for example, radius=4; `tactbench show {name}` shows the units.",
             ) from error
     return name.strip(), given
 
 
 def _in_units(given: Mapping[str, float], parameters: Mapping[str, Parameter]) -> dict[str, Quantity]:
-    """Return numbers in the units of `parameters`; an unknown name gets the unit 1 and is refused by the caller."""
+    """Return quantities in the units of `parameters`; unknown names get the unit 1 and are refused by the caller."""
     return {
         name: sourced(value, parameters[name].unit if name in parameters else "1", _BY) for name, value in given.items()
     }

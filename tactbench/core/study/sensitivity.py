@@ -1,4 +1,4 @@
-"""Runs a task with nuisances at the ends of their ranges, each set of ends into its own folder."""
+"""Runs of a task with nuisances at the ends of their ranges, with one result folder for each combination of ends."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from tactbench.core.study.study import Study, matrix_of
 from tactbench.core.tables.terminal import remark
 
 Single = tuple[str, str]
-"""A nuisance and an end of its range."""
+"""Name of a nuisance, and the end of its range: ``lower`` or ``upper``."""
 STRONGEST = 3
-"""Number of nuisances that are also set in pairs: those whose absence improves the scores most."""
+"""Number of nuisances that are also set in pairs: those with the largest improvement of scores at an end."""
 
 
 def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[Row]:
-    """Run a task as stated, and with `nuisances` (none: all) at ends; return the cells that failed.
+    """Run a task as stated, and with `nuisances` (empty: all) at the ends of their ranges; return rows of failed cells.
 
     Raises
     ------
     UsageError
-        If the rig is not simulated, or a name is wrong.
+        If the rig is not simulated, or a name is unknown.
     """
     registry = installed()
     matrix = matrix_of(study, registry)
     if not registry.rigs[matrix.rig].simulated:
-        raise UsageError(f"Nuisances are set on simulated rigs; {matrix.rig} is not one.", hint="Leave them out.")
+        raise UsageError(f"Nuisances are set on simulated rigs; {matrix.rig} is none.", hint="Use the rig twin.")
     singles = _singles(matrix, registry, nuisances)
     store, choice = Store(study.out), EngineChoice(jobs=study.jobs)
     untimed = matrix.model_copy(update={"latency": False})  # times would be measured with nothing else at work
@@ -63,9 +63,9 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
 def _singles(
     matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]
 ) -> dict[tuple[str, str], dict[str, float]]:
-    """Return the values to set by sensor, for each nuisance and end that differs from the stated value.
+    """Return values by sensor, for each (nuisance, end) that differs from the stated value, in the nuisance's unit.
 
-    A nuisance in which the task's scenes differ is the subject of the task, and is left out.
+    A nuisance that varies between the task's scenes is the subject of the task, and is left out.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def _singles(
 
 
 def _strongest(store: Store, tasks: set[str], singles: set[Single]) -> list[Single]:
-    """Return the nuisances at whose ends the scores improve most, each with that end, as far as computed."""
+    """Return the (nuisance, end) pairs with the largest improvement of scores among those computed."""
     best: dict[str, tuple[float, str]] = {}
     for one in sensitivities(store).values():
         for name in one.rows:

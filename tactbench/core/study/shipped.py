@@ -1,4 +1,4 @@
-"""Files that are installed with tactbench: results of the default matrix, and matrices by name."""
+"""Files installed with tactbench: results of the default matrix, and packaged matrices by name."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from tactbench.core.statistics.replicates import over_replicates
 
 
 def shipped(name: str, in_checkout: str) -> Path:
-    """Return a file that is installed with tactbench: `name` in the package, or `in_checkout` in a checkout of it.
+    """Return the path of a file installed with tactbench: `name` in the package, or `in_checkout` in a source checkout.
 
     Raises
     ------
     ConfigError
-        If the installation has lost it.
+        If the file is missing in this installation.
     """
     package = Path(tactbench.__file__).parent
     for place in (package / name, package.parent / in_checkout):
         if place.exists():
             return place
-    raise ConfigError(name, None, "tactbench was installed without it.", hint="Install tactbench again.")
+    raise ConfigError(name, None, "the file is missing in this installation.", hint="Install tactbench again.")
 
 
 def shipped_rows() -> tuple[list[dict[str, Any]], str]:
-    """Return the rows of the results that came with tactbench, one a cell, and how they were made.
+    """Return the rows of the results installed with tactbench, one for each cell, and a text on their origin.
 
     Raises
     ------
     ConfigError
-        If the installation has lost them.
+        If their file is missing in this installation.
     """
     file = shipped("results/default.json", "examples/results/default.json")
     made = json.loads(file.read_text(encoding="utf-8"))
@@ -48,19 +48,19 @@ def shipped_rows() -> tuple[list[dict[str, Any]], str]:
 
 
 def packaged_matrices() -> dict[str, Path]:
-    """Return the files of the packaged matrices, by name."""
+    """Return the paths of the packaged matrices, by name."""
     return {path.stem: path for path in sorted(shipped("matrices", "examples/matrices").glob("*.yaml"))}
 
 
 def matrix_called(given: str | Path | None = None) -> MatrixSpec:
-    """Return the matrix in the file `given`, or the packaged one of that name; None: ``benchmarks.yaml``.
+    """Return the matrix in the file `given`, or the packaged matrix of this name; None: ``benchmarks.yaml``.
 
     Raises
     ------
     UnknownNameError
-        If there is neither; the message lists the names.
+        If there is neither a file nor a packaged matrix of this name; the message lists the names.
     ConfigError
-        If the file is wrong or cannot be read.
+        If the file is invalid or cannot be read.
     """
     path = Path(given or "benchmarks.yaml")
     if given is None:  # this folder's own, else the one that came with tactbench

@@ -1,4 +1,4 @@
-"""Options of a simulated rig: effects, nuisances, rung and tolerance."""
+"""Options of a simulated rig: effects, nuisances, scenario, solver (rung) and tolerance."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def simulation_of(
     registry: Registry, rig: str, sensors: Sequence[str], effects: str | None, settings: Iterable[str] = (),
     stated: Simulation = Simulation(),  # noqa: B008  (it never changes)
 ) -> Simulation:  # fmt: skip
-    """Return the simulation of a file with the values of --effects and --set.
+    """Return the settings of a simulated rig: those `stated` in the matrix file, changed by --effects and --set.
 
     Raises
     ------
     UsageError
-        If --effects names no effect, --set names no nuisance or gives it a value out of its range, or the rig is not
+        If --effects or --set contains an unknown name, --set a value out of its range, or the rig is not
         simulated.
     """
     given = dict(map(_setting, settings))
@@ -33,7 +33,7 @@ def simulation_of(
     if not (change or given or stated.nuisances):
         return stated
     if not registry.rigs[rig].simulated:
-        raise UsageError(f"--effects and --set are for simulated rigs; {rig} is not one.", hint="Leave them out.")
+        raise UsageError(f"--effects and --set are for simulated rigs; {rig} is none.", hint="Leave out both options.")
     scenarios = [name for sensor in registry.sensors for name in sensor.spec.scenarios]
     for key, what, known in (("scenario", "scenario", scenarios), ("rung", f"rung of {rig}", registry.rigs[rig].rungs)):
         if key in change and change[key] not in known:
@@ -58,7 +58,7 @@ def simulation_of(
 
 
 def _setting(text: str) -> tuple[str, Any]:
-    """Return a name and a value of --set; raises UsageError for a value that is no number where one is expected."""
+    """Return the name and value of a --set option; raises UsageError if a number is expected and not given."""
     name, _, value = text.partition("=")
     if name in _NAMED and value:
         return name, value
@@ -66,15 +66,15 @@ def _setting(text: str) -> tuple[str, Any]:
         return name, TypeAdapter(FiniteFloat).validate_python(value)
     except ValueError as error:
         raise UsageError(
-            f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3."
+            f"--set {text!r} is not NAME=NUMBER.", hint="Write, for example, --set placement_scatter_mm=0.3."
         ) from error
 
 
 def _check_effect(registry: Registry, word: str) -> None:
-    """Raise UsageError for a word of --effects that names no effect, or lacks its sign."""
+    """Raise UsageError if a word of --effects is not the name of an effect, or lacks its sign + or -."""
     name = word.lstrip("+-")
     effects = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
     if name not in effects:
         raise UnknownNameError("effect", name, effects)
     if word == name and (name not in registry.effects or registry.effects.owned(name).ours):
-        raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")
+        raise UsageError(f"--effects {word!r} lacks its sign + or -.", hint=f"Write +{word} or -{word}.")

@@ -1,4 +1,4 @@
-"""One run: its options, the matrix that they describe, and its execution."""
+"""A benchmark run: its options, the matrix that these options describe, and its execution."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tactbench.core.study.simulation import simulation_of
 
 
 def _each(given: Any) -> Any:
-    """Return one word or path, or several, as a list of words; an empty list for None."""
+    """Return a word or path, or a sequence of them, as a list of words; an empty list for None."""
     several = () if given is None else (given,) if isinstance(given, str | os.PathLike) else given
     if not isinstance(several, Iterable):
         return given
@@ -39,7 +39,7 @@ Words = Annotated[
 
 
 class Study(Frozen):
-    """The options of ``tactbench run``; the matrix file has the values of those that are not given."""
+    """The options of ``tactbench run``; options that are not given take the values of the matrix file."""
 
     sensor: Words = ()
     task: Words = ()
@@ -50,7 +50,7 @@ class Study(Frozen):
     protocol: Words = ()
     split: Words = ()
     estimator: Words | None = None
-    """Estimators; trivial ones run beside them, and by themselves if this is empty."""
+    """Names of estimators; trivial estimators are always run as well, and alone if this is empty."""
     config: Path | None = None
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
     seed: int | None = Field(default=None, ge=0)
@@ -68,7 +68,7 @@ class Study(Frozen):
 
 
 def carry_out(study: Study) -> tuple[Store, Outcome]:
-    """Run a study and show the progress; return the result folder and the outcome of its cells.
+    """Run a study, showing its progress; return the result folder and the outcome of its cells.
 
     Raises as `matrix_of` and `tactbench.core.matrix.run.run_matrix` do.
     """
@@ -85,19 +85,19 @@ def carry_out(study: Study) -> tuple[Store, Outcome]:
 
 
 def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
-    """Return the matrix of the file with the options of the study.
+    """Return the matrix of the file, with its values replaced by the options of the study.
 
     Raises
     ------
     UsageError
-        If a file, a name or a combination of options is wrong.
+        If a file, a name or a combination of options is invalid.
     """
     matrix = matrix_called(study.config or ("real" if study.dataset else None))
     simulated, replays = registry.first_rig("simulated"), registry.first_rig("replays")
     change: dict[str, Any] = {"rig": matrix.rig or simulated}
     over: dict[str, Any] = {}
     if study.dataset and (study.recordings or study.rig_file or study.rig not in (None, replays)):
-        raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings and --rig-file.")
+        raise UsageError("--dataset replaces all recordings.", hint="Leave out --rig, --recordings and --rig-file.")
     if study.rig or study.recordings or study.rig_file or study.dataset:
         file = load_yaml(study.rig_file, RigFile) if study.rig_file else None
         change["rig"] = study.rig or (file.rig if file else replays)
@@ -127,7 +127,7 @@ def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
 
 
 def _of_datasets(study: Study, matrix: MatrixSpec) -> list[TaskChoice]:
-    """Return the tasks of each data set: the study's with the options of the matrix, or else those of the data set."""
+    """Return the tasks for each data set: those of the study, or else all of the data set, with the matrix' options."""
     from tactbench.core.recording.datasets import dataset_called
 
     found = []
@@ -140,7 +140,7 @@ def _of_datasets(study: Study, matrix: MatrixSpec) -> list[TaskChoice]:
 
 
 def _with_those_beside(choices: list[TaskChoice], registry: Registry) -> Iterator[TaskChoice]:
-    """Yield the tasks, each with the tasks of its field `beside` under the same protocol, split and estimators."""
+    """Yield the tasks, each followed by those in its field `beside`, with the same protocol, split and estimators."""
     names = {choice.name for choice in choices}
     for choice in choices:
         yield choice

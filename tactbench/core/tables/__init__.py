@@ -1,1 +1,1 @@
-"""The table of text, and its renderers for terminal, Markdown, LaTeX, CSV and HTML."""
+"""Tables of text, and their output on a terminal, as Markdown, LaTeX, CSV and HTML."""

@@ -1,4 +1,4 @@
-"""Records as CSV."""
+"""Output of tables as CSV."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tactbench.core.tables.text import json_text
 
 
 def csv_text(names: Iterable[str], lines: Iterable[Iterable[Any]]) -> str:
-    """Return lines as CSV with a header; lists and mappings inside a cell are JSON."""
+    """Return lines as CSV text with a header of `names`; lists and mappings in a field become JSON."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(names)

@@ -1,4 +1,4 @@
-"""Tables as HTML, for a notebook's output."""
+"""Output of tables as HTML, for notebooks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tactbench.core.tables.text_table import TextTable
 
 
 def html(tables: Iterable[TextTable]) -> str:
-    """Return tables with their notes as HTML without scripts; text from plugins is escaped."""
+    """Return tables and their notes as HTML without scripts; all texts are escaped."""
     return "\n".join(map(_table, tables))
 
 

@@ -1,4 +1,4 @@
-"""Tables as LaTeX for the booktabs package and pdfLaTeX; names are escaped."""
+"""Output of tables as LaTeX for pdfLaTeX with the booktabs package; all texts are escaped."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ _TEX = {
     "≤": r"$\le$", "≥": r"$\ge$", "−": "$-$", "µ": r"$\mu$", "μ": r"$\mu$", "²": r"$^2$", "³": r"$^3$",
     "=": r"=\allowbreak{}", "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
 }  # fmt: skip
-"""Escapes; brackets and the star stand in braces, since after ``\\\\`` they would be options."""
+"""LaTeX code by character; brackets and the star are in braces, since after ``\\\\`` they would be options."""
 
 
 def latex(tables: Iterable[TextTable]) -> str:
-    """Return tables as LaTeX over both columns of a paper."""
+    """Return tables as LaTeX, as wide as both columns of a paper."""
     return "\n".join(latex_table(one, number=number) for number, one in enumerate(tables, 1))
 
 
 def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: int | None = None) -> str:
-    """Return a table as LaTeX, its title as the caption; text between backticks is code elsewhere.
+    """Return a table as LaTeX, with its title as the caption; backticks in notes are removed.
 
-    A heading may have two lines.
+    A heading may have two lines, separated by a line break.
 
     Parameters
     ----------
     number
-        Of the table among those of one file: its label ends in it.
+        Number of the table in a file, used at the end of its label.
     columns
-        Of the ``tabular``, for a table of one column of a paper; empty: over both columns, numbers to the right.
+        Column types of ``tabular`` for a table in one column of a paper; empty: a table as wide as both columns.
     rule
-        The line above which there is a rule.
+        Index of the line above which a horizontal rule is drawn.
     """
     heads = zip(*(head.rpartition("\n")[::2] for head in table.headers), strict=True)
     environment = "table" if columns else "table*"
@@ -65,13 +65,13 @@ def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: i
 
 
 def _label(title: str, number: int) -> str:
-    """Return a label from the beginning of the title and the number of the table: ``tab:tactbench-force-1``."""
+    """Return a LaTeX label made of the first words of the title and the table's number: ``tab:tactbench-force-1``."""
     first = re.sub(r"[^A-Za-z0-9]+", "-", re.split(" · |[:.,]", title)[0]).strip("-").lower()
     return f"tab:tactbench-{first or 'table'}-{number}"
 
 
 def tex(text: str) -> str:
-    """Return text escaped for LaTeX; a character that pdfLaTeX lacks becomes its number, ``U+4E2D``."""
+    """Return text escaped for LaTeX; characters that pdfLaTeX cannot print become code points: ``U+4E2D``."""
     return "".join(map(_character, text))
 
 

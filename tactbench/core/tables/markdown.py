@@ -1,4 +1,4 @@
-"""Tables as Markdown; markup in names is escaped."""
+"""Output of tables as Markdown; markup in texts is escaped."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Iterable, Sequence
 from tactbench.core.tables.text_table import TextTable
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
-"""Characters that are markup anywhere, and underscores at the edge of a word."""
+"""Characters to escape: those that are markup anywhere, and underscores at the edge of a word."""
 
 
 def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:
-    """Return tables, each under a heading, and notes as Markdown."""
+    """Return tables, each under its title as a heading, and lists of notes as Markdown."""
     return "\n\n".join("\n".join(_table(one) if isinstance(one, TextTable) else _notes(one)) for one in parts) + "\n"
 
 
 def _table(table: TextTable) -> list[str]:
-    """Return a table as lines of Markdown: a heading, sentences, columns of numbers to the right, notes."""
+    """Return a table as lines of Markdown: heading, sentences, columns with numbers aligned right, notes."""
     return [
         f"### {markdown_text(table.title)}\n",
         *([f"{markdown_note(table.origin)}\n"] if table.origin else []),
@@ -34,7 +34,7 @@ def _notes(notes: Sequence[str]) -> list[str]:
 
 
 def markdown_text(text: str) -> str:
-    """Return text escaped for a table or a heading; line breaks become ``<br>``."""
+    """Return text escaped for a Markdown table or heading; line breaks become ``<br>``."""
     return "<br>".join(_escaped(line).replace("`", "\\`") for line in text.split("\n"))
 
 

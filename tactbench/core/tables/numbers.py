@@ -1,4 +1,4 @@
-"""Scores, intervals and times as text."""
+"""Formatting of scores, intervals and times as text."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ ABSENT = "–"
 
 
 def score(value: float | None, unit: str) -> str:
-    """Return a score: three decimals for a share; four for a number with a unit, two from ten on."""
+    """Return a score as text: three decimals if its unit is 1; otherwise four decimals, or two from 10 on."""
     if value is None:
         return ABSENT
     return f"{value:.3f}" if unit == "1" else f"{value:.4f}" if -10 < value < 10 else f"{value:.2f}"
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """Return an interval in the digits of its score; an upper end of None is open."""
+    """Return an interval as text with the decimals of `score`; its upper end is "open" if `high` is None."""
     return ABSENT if low is None else f"{score(low, unit)} … {'open' if high is None else score(high, unit)}"
 
 
 def signed(value: float, unit: str) -> str:
-    """Return a difference in the digits of its scores, with its sign."""
+    """Return a difference of scores as text with its sign and the decimals of `score`."""
     return ("+" if value >= 0 else "−") + score(abs(value), unit)
 
 
 def suffix(unit: str) -> str:
-    """Return the text after a number: its unit, if it has one."""
+    """Return the text to append to a number: a space and the unit, or nothing if the unit is 1."""
     return "" if unit == "1" else f" {unit}"
 
 
 def score_with_unit(value: float | None, unit: str) -> str:
-    """Return a score with its unit."""
+    """Return a score as text with its unit, as ``0.1234 N``."""
     return score(value, unit) + suffix(unit)
 
 
 def duration(seconds: float | None) -> str:
-    """Return a duration with three significant digits and a unit that fits."""
+    """Return a duration as text with three significant digits, in s, ms or µs."""
     if seconds is None:
         return ABSENT
     if seconds >= 0.9995:
@@ -52,7 +52,7 @@ def duration(seconds: float | None) -> str:
 
 
 def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
-    """Return an answer delay, with ≥ where the delay of the link is not known."""
+    """Return the delay of an answer as text, with ≥ if the delay of the sensor's link is unknown."""
     if known_ms is None:
         return ABSENT
     least = "≥ " if parts_ms and "window" in parts_ms and "link" not in parts_ms else ""
@@ -60,5 +60,5 @@ def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
 
 
 def whole(value: int | None) -> str:
-    """Return a count with thin groups of three."""
+    """Return a count as text, with a thin space between groups of three digits."""
     return ABSENT if value is None else f"{value:,}".replace(",", "\u202f")

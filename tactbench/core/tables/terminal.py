@@ -1,4 +1,4 @@
-"""Results on stdout as tables and notes, remarks on stderr."""
+"""Output on a terminal: tables and notes on stdout, remarks on stderr."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim", "alarm": "yellow", "inside": "bold"}
 _GAP, _MARGIN = 2, 1
 _LEAST = 4
-"""Smallest width of a column of words."""
+"""Smallest width of a column of words [characters]."""
 WITHOUT_EDGE = 400
-"""Width of a table in a file or a pipe: enough for all columns with names of ordinary length."""
+"""Width of a table in a file or a pipe [characters], enough for all columns with names of ordinary length."""
 Part = TextTable | Sequence[str]
-"""A table, or notes."""
+"""Part of an output: a table, or a sequence of notes."""
 
 
 def remark(text: str) -> None:
-    """Print a remark to stderr, beside the results on stdout."""
+    """Print a remark on stderr, since stdout is for results; control characters are escaped."""
     print(visible_lines(text), file=sys.stderr)
 
 
 def show(parts: Iterable[Part]) -> None:
-    """Print tables and notes on stdout; text from plugins is never read as markup."""
+    """Print tables and notes on stdout; markup in their texts is printed literally."""
     from rich.console import Console
 
     if sys.stdout.isatty():
@@ -39,7 +39,7 @@ def show(parts: Iterable[Part]) -> None:
 
 
 def plain_text(parts: Iterable[Part], width: int = 240) -> str:
-    """Return the text that a terminal without colours shows."""
+    """Return tables and notes as on a terminal of `width` characters without colours."""
     from rich.console import Console
 
     out = io.StringIO()
@@ -71,7 +71,7 @@ def _print_notes(notes: Sequence[str], console: Console) -> None:
 
 
 def _print_table(table: TextTable, console: Console) -> list[str]:
-    """Print a table without its notes; return the columns that did not fit."""
+    """Print a table without its notes; return the headings of the columns that did not fit."""
     from rich.cells import cell_len
     from rich.padding import Padding
     from rich.table import Table
@@ -103,9 +103,9 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
 
 
 def _widths(table: TextTable, room: int) -> dict[int, int]:
-    """Return the widths of the columns that fit, by place.
+    """Return the widths of the columns that fit into `room` characters, by index of the column.
 
-    Headings and texts are broken at spaces, numbers are not. Columns that may go do so before a word is cut.
+    Headings and texts are broken at spaces, numbers are not. Columns in `first_to_go` go before a word is cut.
     """
     from rich.cells import cell_len
 

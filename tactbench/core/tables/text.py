@@ -1,4 +1,4 @@
-"""Makes text from plugins and recordings printable: control characters are escaped."""
+"""Escaping of control characters in texts from plugins and recordings, so that these can be printed."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import unicodedata
 from typing import Any
 
 _ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
-"""Control characters, marks of direction and lone surrogates."""
+"""Characters to escape in JSON: control characters, marks of direction and lone surrogates."""
 
 
 def visible(text: str) -> str:
-    r"""Return `text` on one line, every character that acts instead of showing written out as an escape.
+    r"""Return `text` on one line, with every unprintable character written out as an escape.
 
     Control characters (the ESC that begins a terminal's commands), marks that turn the direction of reading, lone
     surrogates, private and unassigned characters become ``\x1b``, ``\u202e`` or ``\U000e0001``; line breaks, tabs and
@@ -24,7 +24,7 @@ def visible(text: str) -> str:
 
 
 def visible_lines(text: str) -> str:
-    """Return `text` with every line made visible; line breaks stay."""
+    """Return `text` with unprintable characters escaped as by `visible`; line breaks are kept."""
     return "\n".join(map(visible, text.split("\n")))
 
 
@@ -38,17 +38,17 @@ def _shown(character: str) -> str:
 
 
 def command_line(*words: str) -> str:
-    """Return a command as it is typed into a shell; a name that acts instead of showing is shown and not typed."""
+    """Return the words as a shell command with quotes where needed; unprintable characters are escaped."""
     return visible(shlex.join(words))
 
 
 def cut(text: str, most: int) -> str:
-    """Return the first `most` characters of `text`, and an ellipsis where there are more."""
+    """Return `text`, cut to `most` characters with an ellipsis at the end if it is longer."""
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def json_text(value: Any, **how: Any) -> str:
-    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
+    """Return `value` as JSON: control characters and lone surrogates are escaped; NaN and infinity become null."""
     try:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
     except ValueError:
@@ -59,7 +59,7 @@ def json_text(value: Any, **how: Any) -> str:
 
 
 def _finite(value: Any) -> Any:
-    """Return `value` with None in place of every number that is not finite."""
+    """Return `value` with None in place of NaN and infinity, in nested lists and dicts too."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

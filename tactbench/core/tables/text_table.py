@@ -1,4 +1,4 @@
-"""The table of text that every format for people renders."""
+"""The table of texts that all output formats for people render."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from typing import Any
 from tactbench.core.tables.numbers import ABSENT as ABSENT
 
 WORDY = 60
-"""A field of more characters wraps as prose."""
+"""Number of characters beyond which a field is wrapped as prose."""
 
 
 class Entry(str):
-    """A text of a table with the number behind it and a link."""
+    """Text of a table field, with the number for sorting and the name of the cell to link to."""
 
     __slots__ = ("cell", "value")
     value: float | None
-    """Number that a column is sorted by, in one unit for the whole column; None sorts last."""
+    """Number by which the column is sorted, in one unit for the whole column; None sorts last."""
     cell: str
-    """The cell that it is from, by name; a page that has a place for each cell makes a link of it."""
+    """Name of the cell with this result, for a link to the cell's details; empty: no link."""
 
     def __new__(cls, text: str, value: float | None = None, *, cell: str = "") -> Entry:
-        """Return the text with its number and its cell."""
+        """Return the text with its number and the name of its cell."""
         entry = super().__new__(cls, text)
         entry.value, entry.cell = value, cell
         return entry
@@ -31,47 +31,47 @@ class Entry(str):
 
 @dataclass(frozen=True)
 class TextTable:
-    """A title, columns, lines and notes."""
+    """A table of texts: title, columns, lines and notes."""
 
     title: str
     columns: tuple[str, ...]
-    """Names of the columns."""
+    """Names of the columns, from left to right."""
     lines: tuple[tuple[str, ...], ...]
-    """One text a column; some may be `Entry`."""
+    """Texts of each line, one for each column; some may be of the type `Entry`."""
     numeric: frozenset[str] = frozenset()
-    """Columns aligned to the right and sorted by value."""
+    """Names of the columns aligned to the right and sorted by number."""
     headings: tuple[str, ...] = ()
-    """Headings of the columns, if they are not their names."""
+    """Headings of the columns; empty: their names."""
     kinds: tuple[str, ...] = ()
-    """One word a line, by which it looks other than plain: ``result``, ``baseline``, ``failed``, ``alarm`` …"""
+    """Style of each line: ``result``, ``baseline``, ``failed``, ``alarm`` …; empty: plain."""
     origin: str = ""
-    """Where the numbers come from, to the right of the title: simulated or measured."""
+    """Text to the right of the title: origin of the numbers, such as simulated or measured."""
     summary: tuple[str, ...] = ()
-    """Sentences below the title."""
+    """Sentences between the title and the lines of the table."""
     notes: tuple[str, ...] = ()
-    """Sentences below the lines."""
+    """Sentences below the lines of the table."""
     first_to_go: tuple[str, ...] = ()
-    """Columns that a terminal leaves out, in this order, where it is too narrow even with texts broken at spaces."""
+    """Columns to leave out, in this order, on a terminal that is too narrow even with texts broken at spaces."""
     unbroken: frozenset[str] = frozenset()
-    """Columns of texts that are not broken: they are typed elsewhere."""
+    """Names of columns whose texts are not broken into lines, so that they can be copied."""
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Return the headings of the columns."""
+        """Headings of the columns, by default their names."""
         return self.headings or self.columns
 
     @property
     def right(self) -> tuple[bool, ...]:
-        """Return for each column whether it is aligned to the right."""
+        """For each column, True if it is aligned to the right."""
         return tuple(name in self.numeric for name in self.columns)
 
     @property
     def wordy(self) -> bool:
-        """Return whether it has sentences in its fields; a narrow screen stacks their lines, field below field."""
+        """True if a field has more than `WORDY` characters; a narrow screen then shows field below field."""
         return any(len(text) > WORDY for line in self.lines for text in line)
 
     def compact(self, keep: Collection[str] = ()) -> TextTable:
-        """Return the table without columns that are empty in all lines, except for those to `keep`."""
+        """Return the table without columns that are empty in all lines, except for columns in `keep`."""
         if not self.lines:
             return self
         texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
@@ -79,7 +79,7 @@ class TextTable:
         return self.only(filled)
 
     def only(self, names: Collection[str]) -> TextTable:
-        """Return the table with these of its columns."""
+        """Return the table with only the columns in `names`."""
         kept = [place for place, name in enumerate(self.columns) if name in names]
         return replace(
             self,
@@ -90,7 +90,7 @@ class TextTable:
 
 
 def sort_value(text: str) -> float | None:
-    """Return what a text is sorted by in a column of numbers: the value of an `Entry`, else the number that it is."""
+    """Return the number by which a text is sorted: the value of an `Entry`, else the text as a number, or None."""
     if isinstance(text, Entry):
         return text.value
     try:
@@ -100,7 +100,7 @@ def sort_value(text: str) -> float | None:
 
 
 def finite(value: object) -> float | None:
-    """Return `value` if it is a finite number: nothing else can be sorted."""
+    """Return `value` as a float if it is a finite number, else None."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return float(value)
@@ -115,7 +115,7 @@ def text_table(
     notes: Sequence[str] = (),
     kinds: Sequence[str] = (),
 ) -> TextTable:
-    """Return a table without columns that are empty in all lines."""
+    """Return the table of `lines`, without columns that are empty in all lines."""
     given = tuple(map(tuple, lines))
     return TextTable(title, tuple(columns), given, frozenset(numeric), kinds=tuple(kinds), notes=tuple(notes)).compact()
 
@@ -123,7 +123,7 @@ def text_table(
 def records_table(
     title: str, records: Sequence[Mapping[str, Any]], columns: Sequence[str] = (), *, kinds: Sequence[str] = ()
 ) -> TextTable:
-    """Return a table of records: these of their keys, by default all of them; numbers stand to the right."""
+    """Return a table with one line for each record and the keys `columns` (default: all); numbers are aligned right."""
     shown = columns or tuple(dict.fromkeys(name for record in records for name in record))
     lines = [[Entry(field_text(one.get(name)), finite(one.get(name))) for name in shown] for one in records]
     numeric = [name for name in shown if any(finite(one.get(name)) is not None for one in records)]
@@ -131,7 +131,7 @@ def records_table(
 
 
 def field_text(value: Any) -> str:
-    """Return a value as text on one line; empty for None."""
+    """Return a value, such as a list or mapping, as text for a table field; empty for None."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

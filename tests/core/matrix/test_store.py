@@ -231,6 +231,6 @@ def test_no_plain_data_and_what_is_read_back_otherwise_leave_no_file(tmp_path, m
     monkeypatch.setattr(STORE, "replace_file", lambda path, content: path.write_bytes(content[:-1]))
     with Store(tmp_path).hold() as store:
         for error, chosen in ((ValueError, {"alpha": math.nan}), (FolderError, {})):
-            with pytest.raises(error, match=r"JSON|read back"):
+            with pytest.raises(error, match=r"JSON|differs from what was written"):
                 kept(store, "a", chosen=chosen)
         assert (store.finished(key("a")), store.rows(), list(tmp_path.glob("cells/*"))) == (None, [], [])

@@ -1,12 +1,12 @@
-"""The result folder: a file for each cell that ended, and an index over them.
+"""The result folder: one file for each evaluated cell, and an index of these files.
 
 ::
 
     OUT/
-      cells/KEY.h5                       one cell: its row, what its key is made of, its provenance, its answers
-      results.sqlite                     an index of cells/ and recordings/, made anew when it is lost or old
-      recordings/SENSOR/SCENE-KEY.h5     what a rig recorded
-      leaderboard.md, .csv, .json        the table of the last run
+      cells/KEY.h5                       one cell: its row, sections of its key, provenance and answers
+      results.sqlite                     an index of cells/ and recordings/, rebuilt if lost or outdated
+      recordings/SENSOR/SCENE-KEY.h5     recordings made by a rig
+      leaderboard.md, .csv, .json        leaderboard of the last run
 """
 
 from tactbench.core.matrix.store.store import Row, Store, writing

@@ -21,31 +21,31 @@ _COLUMNS = tuple(column.name for column in fields(Answers))
 
 @dataclass(frozen=True)
 class CellFile:
-    """Content of the file of a cell."""
+    """Content of a cell's file: row, sections of the key, provenance and answers."""
 
     row: dict[str, Any]
-    """As `tactbench.core.spec.row.RowModel` describes it."""
+    """Result row with the keys of `tactbench.core.spec.row.RowModel`."""
     sections: Mapping[str, Any] = field(default_factory=dict)
-    """Sections of its key."""
+    """Sections of the cell's key; see `tactbench.core.matrix.keys`."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     ended_ns: int = 0
-    """Time of writing, nanoseconds since the epoch; the latest file of a cell counts."""
+    """Time of writing [ns since the epoch]; the latest file of a cell is valid."""
     answers: Mapping[str, Answers] = field(default_factory=dict)
     """Answers by role; empty for a cell that did not finish."""
 
     @property
     def text(self) -> str:
-        """All but the answers, as JSON."""
+        """Everything except for the answers, as JSON."""
         head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
         return json.dumps(head, allow_nan=False)
 
     @property
     def digests(self) -> dict[str, str]:
-        """Digests of the answers by role."""
+        """SHA-256 digests of the answers by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
 
     def content(self) -> bytes:
-        """Return the bytes of the file."""
+        """Return the content of the HDF5 file as bytes."""
         import numpy as np
 
         text = self.text.encode()
@@ -60,12 +60,12 @@ class CellFile:
 
 
 def read_cell(path: Path, *, answers: bool = True) -> CellFile:
-    """Read the file of a cell, with or without its answers.
+    """Return the content of a cell's file, with or without its answers.
 
     Raises
     ------
     FormatError
-        If the file is not a cell, or was changed after it was written.
+        If the file is not a cell's file of this version, or was changed after writing.
     """
     import h5py
 
@@ -75,7 +75,7 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
         raise FormatError(f"{path} cannot be read: {error}.", hint="Run the cell again.") from error
     begins = content[:_USER_BLOCK].rstrip(b"\0")
     if begins != _opening(content[_USER_BLOCK:]):
-        what = "does not hold what was written" if begins.startswith(FORMAT) else "is not a cell of this version"
+        what = "was changed after writing" if begins.startswith(FORMAT) else "is not a cell's file of this version"
         raise FormatError(f"{path} {what}.", hint="Run the cell again.")
     with h5py.File(io.BytesIO(content), "r") as file:
         head = json.loads(file["head"][()])
@@ -89,12 +89,12 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
 
 
 def _opening(body: bytes) -> bytes:
-    """Return the content of the user block, with a digest: the HDF5 library may crash on damaged files."""
+    """Return the user block with a digest, to detect damaged files, on which the HDF5 library may crash."""
     return FORMAT + hashlib.sha256(body).hexdigest().encode()
 
 
 def _table(answers: Answers) -> Any:
-    """Return (n,) answers, a field for each column, little-endian."""
+    """Return the (n,) structured array of answers with one field for each column, little-endian."""
     import numpy as np
 
     columns = {name: getattr(answers, name) for name in _COLUMNS}

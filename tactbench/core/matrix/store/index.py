@@ -1,7 +1,7 @@
-"""``results.sqlite``: an index of the files of a result folder, for quick listings and for queries.
+"""``results.sqlite``: index of the files of a result folder, for quick listings and for queries.
 
-The files are authoritative. A lost, damaged or outdated index is rebuilt from them; an entry is valid as long as size
-and modification time of its file are unchanged. Where it cannot be written, on a read-only disk, it is kept in memory.
+The files are authoritative: a lost, damaged or outdated index is rebuilt from the files. An entry is valid while size
+and modification time of its file are unchanged. On a read-only disk, the index is kept in memory.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from tactbench.core.spec.row import FORMAT
 
 VERSION = 3
 _LOCKED_S = 10.0
-"""Seconds to wait for another process that writes the index."""
+"""Time limit for waiting for another process that writes the index [s]."""
 _TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
 COLUMNS = {
     name: next(_TYPES[kind] for kind in (str, float, int, bool) if kind in kinds)
     for name, kinds in FORMAT.items()
     if not kinds & {dict, list}
 }
-"""Columns of the index: the keys of a row that are neither mappings nor lists."""
+"""Columns of the index with their SQL types: the keys of a row whose values are neither mappings nor lists."""
 _SCHEMA = f"""
 CREATE TABLE IF NOT EXISTS cells (
   file TEXT PRIMARY KEY, size INTEGER, modified_ns INTEGER, ended_ns INTEGER,
@@ -44,31 +44,31 @@ PRAGMA user_version = {VERSION};
 
 
 class Index:
-    """The index of the result folder `folder`, which is opened when it is first needed."""
+    """Index of the result folder `folder`; its database is opened at first use."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.troubles: list[str] = []
-        """Sentences about files that could not be read."""
+        """One sentence for each file that could not be read."""
         self._database: sqlite3.Connection | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the latest row of every cell, in the order of their names and replicates."""
+        """Return the latest row of every cell, sorted by name and seed."""
         found = self._all("SELECT row FROM latest ORDER BY rtrim(cell, '0123456789'), seed")
         return [json.loads(text) for (text,) in found]
 
     def finished(self, key: str) -> dict[str, Any] | None:
-        """Return the row of a finished cell by its key, or None."""
+        """Return the row of the finished cell with a key, or None."""
         found = self._all("SELECT row FROM cells WHERE key = ? AND status = 'done'", key)
         return json.loads(found[0][0]) if found else None
 
     def provenance(self, name: str) -> dict[str, Any]:
-        """Return which software computed a cell where, by the id in ``row["made_by"]``; empty if not known."""
+        """Return the provenance (software and machine) with the id in ``row["made_by"]``; empty if unknown."""
         found = self._all("SELECT text FROM provenance WHERE id = ?", name)
         return json.loads(found[0][0]) if found else {}
 
     def about(self, recording: Path) -> Mapping[str, Any]:
-        """Return content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
+        """Return the content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
 
         The scene is None for recordings without a planned scene, such as an imported table.
         """
@@ -82,22 +82,22 @@ class Index:
         return dict(zip(("digest", "sensor", "scene"), facts, strict=True))
 
     def _files_of(self, cell: str) -> list[tuple[str, str, str]]:
-        """Return file, key and status of the files of a cell, the latest first."""
+        """Return (file, key, status) of each file of a cell, the latest first."""
         return self._all("SELECT file, key, status FROM cells WHERE cell = ? ORDER BY ended_ns DESC", cell)
 
     def _put(self, path: Path, cell: CellFile) -> None:
-        """Add or replace the entry of the file of a cell."""
+        """Add or replace the index entry of a cell's file."""
         row = cell.row
         facts = (path.name, *signature(path), cell.ended_ns, *map(row.get, COLUMNS), json.dumps(row))
         self._all(f"REPLACE INTO cells VALUES ({', '.join('?' * len(facts))})", *facts)
         self._all("INSERT OR IGNORE INTO provenance VALUES (?, ?)", row.get("made_by", ""), json.dumps(cell.provenance))
 
     def _drop(self, name: str) -> None:
-        """Remove the entry of a file."""
+        """Remove the index entry of a file."""
         self._all("DELETE FROM cells WHERE file = ?", name)
 
     def _refresh(self) -> None:
-        """Bring the index up to date with the files."""
+        """Update the index from the files in the folder."""
         self.troubles = []
         found = {path.name: path for path in (self.folder / "cells").glob("[!.]*.h5")}
         known = dict(self._all("SELECT file, size || ' ' || modified_ns FROM cells"))
@@ -112,7 +112,7 @@ class Index:
                 self.troubles.append(str(error))
 
     def _all(self, query: str, *values: Any) -> list[Any]:
-        """Return the result of a statement; if the disk is full or the index damaged, go on with one in memory."""
+        """Return the rows of an SQL statement; if the disk is full or the index damaged, use an index in memory."""
         path = self.folder / "results.sqlite"
         try:
             if self._database is None:
@@ -130,7 +130,7 @@ class Index:
 
 
 def signature(path: Path) -> tuple[int, int]:
-    """Return size and time of modification [ns] of a file; zeros if there is none."""
+    """Return size [bytes] and modification time [ns] of a file; zeros if the file does not exist."""
     try:
         stat = path.stat()
     except OSError:
@@ -139,7 +139,7 @@ def signature(path: Path) -> tuple[int, int]:
 
 
 def _opened(path: Path | None) -> sqlite3.Connection:
-    """Open the index, or one in memory; raises sqlite3.Error for one that is damaged or of another version."""
+    """Open the database at `path` (None: in memory); raises sqlite3.Error if damaged or of another version."""
     database = sqlite3.connect(path or ":memory:", timeout=_LOCKED_S)
     (version,) = database.execute("PRAGMA user_version").fetchone()
     if version not in (0, VERSION):

@@ -1,4 +1,4 @@
-"""Reading and writing of a result folder."""
+"""Reading and writing of the cells and recordings of a result folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tactbench.core.samples import Answers
 
 Row = dict[str, Any]
-"""One cell, as `tactbench.core.spec.row.RowModel` describes it."""
+"""Result row of a cell, with the keys of `tactbench.core.spec.row.RowModel`."""
 
 _FULL = {
     errno.ENOSPC: "the disk is full",
@@ -32,22 +32,22 @@ _FULL = {
 
 
 class Store(Index):
-    """A result folder at the path `folder`, which need not exist: :meth:`hold` makes it."""
+    """Result folder at the path `folder`; a missing folder is created by :meth:`hold`."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
         self._made_by: tuple[str, Mapping[str, Any]] = ("", {})
         self.superseded: list[str] = []
-        """Cells whose latest answer was replaced, by this object, with one from other recordings."""
+        """Names of cells whose latest result was replaced in this run by a result from other recordings."""
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
-        """Create the folder if necessary, and lock it for this run until the end of the context.
+        """Create the folder if necessary, and lock it for this process until the end of the context.
 
         Raises
         ------
         FolderError
-            If another run holds the folder, or it cannot be created or written.
+            If the folder is in use by another run, or cannot be created or written.
         """
         with writing(self.folder):
             for part in ("recordings", "cells"):
@@ -56,8 +56,8 @@ class Store(Index):
         try:
             if try_lock(lock) is False:
                 raise FolderError(
-                    f"Another run is at work in {self.folder}.",
-                    hint="Wait until it ends, or give another folder with --out DIR.",
+                    f"Another run is using the result folder {self.folder}.",
+                    hint="Wait until that run ends, or give another folder with --out DIR.",
                 )
             with writing(self.folder):
                 for left in (self.folder / "cells").glob(".*.partial"):  # of a run that was killed
@@ -67,14 +67,14 @@ class Store(Index):
             os.close(lock)
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
-        """Set the provenance of cells that are written from now on, and return its id."""
+        """Set the provenance of all cells written from now on, and return its id."""
         self._made_by = digest_of(json.dumps(provenance, sort_keys=True))[:16], provenance
         return self._made_by[0]
 
     def keep(
         self, row: Mapping[str, Any], sections: Mapping[str, Any], answers: Mapping[str, Answers] | None = None
     ) -> Row:
-        """Write the file of a cell that has ended, and return its row.
+        """Write the file of an evaluated, failed or skipped cell, and return its row.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class Store(Index):
         return kept
 
     def reuse(self, row: Row) -> None:
-        """Make a finished cell the latest one of its name in `row`."""
+        """Make the finished cell of `row` the latest cell of its name, by writing its file again if necessary."""
         latest = self._files_of(row["cell"])
         if not latest or latest[0][1] != row["key"]:
             cell = read_cell(self.file_of(row))
@@ -113,15 +113,15 @@ class Store(Index):
         self._put(path, cell)
 
     def file_of(self, row: Mapping[str, Any]) -> Path:
-        """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
+        """Return the path of a cell's file, named by the key, or by the digest of the cell's name if it has no key."""
         return self.folder / "cells" / f"{row.get('key') or digest_of(row['cell'])}.h5"
 
     def cell(self, row: Mapping[str, Any]) -> CellFile:
-        """Return the content of the file of a row's cell; raises FormatError if it cannot be read."""
+        """Return the content of the cell's file for a row; raises FormatError if the file cannot be read."""
         return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
-        """Return the answers of a finished cell by role; none for a cell that is missing or cannot be read."""
+        """Return the answers of the finished cell with a key, by role; empty if its file is missing or unreadable."""
         path = self.folder / "cells" / f"{key}.h5"
         try:
             return dict(read_cell(path).answers) if path.is_file() else {}
@@ -131,18 +131,18 @@ class Store(Index):
             return {}
 
     def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
-        """Return each recording that a row names, in its order, and its file, or None if it is not there."""
+        """Return (name, path) of each recording listed in a row; the path is None if the file does not exist."""
         found = [(path, self.folder / named_file(path)) for path in row["recordings"]]
         return [(path, file if file.is_file() else None) for path, file in found]
 
     def beside(self, path: Path) -> str:
-        """Return `path` relative to the folder where it lies inside, so that the folder may be moved."""
+        """Return `path` relative to the result folder if inside, so that the folder can be moved, else absolute."""
         inside = path.is_relative_to(self.folder)
         return str(path.relative_to(self.folder)) if inside else str(path.resolve())
 
 
 def _check_written(path: Path, cell: CellFile) -> None:
-    """Read the file of a cell back; FolderError, and no file, if it holds anything else."""
+    """Read a written cell file back; if its content differs from `cell`, remove it and raise FolderError."""
     try:
         found = read_cell(path)
         same = (found.text, found.digests) == (cell.text, cell.digests)
@@ -150,18 +150,18 @@ def _check_written(path: Path, cell: CellFile) -> None:
         same = False
     if not same:
         path.unlink(missing_ok=True)
-        raise FolderError(f"What is read back of {path} is not what was written.", hint="Did the disk fail?")
+        raise FolderError(f"The content of {path} differs from what was written.", hint="Check the disk for errors.")
 
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Turn system errors while `folder` is written into a FolderError with a hint."""
+    """Return a context that turns system errors in writing `folder` into a FolderError with a hint."""
     try:
         yield
     except OSError as error:
-        kept = "What was finished before is kept"
+        kept = "Finished cells are kept"
         what = f"cannot be written: {_FULL.get(error.errno or 0) or error.strerror or error}"
-        hint = f"{kept}: check its permissions, or give another one with --out DIR."
+        hint = f"{kept}: check the folder's permissions, or give another folder with --out DIR."
         if error.errno in _FULL:
-            hint = f"{kept}: make room, and the same command goes on from there."
+            hint = f"{kept}: make room on the disk, then give the same command again."
         raise FolderError(f"The folder {folder} {what}.", hint=hint) from error

@@ -1,1 +1,1 @@
-"""Figures from the results in a folder: those of the paper, published scores, and what accuracy costs in time."""
+"""Figures of the results in a folder: figures as in the paper, published scores, and accuracy against time."""

@@ -1,4 +1,4 @@
-"""Figures of a classification as in the paper: confusion matrices, and a t-SNE map of the test set."""
+"""Figures of classification results as in the paper: confusion matrices, and t-SNE maps of the test set."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDE_FROM = 7
-"""A figure of at least so many classes takes both columns of a page."""
+"""Smallest number of classes for which a figure is as wide as both columns of a page."""
 NUMBERS_UP_TO = 14
-"""Largest number of classes whose numbers fit into their squares."""
+"""Largest number of classes for which numbers fit into the squares of a confusion matrix."""
 AT_MOST = 1000
-"""Largest number of points of a map: more take longer and hide each other in a column's width."""
+"""Largest number of points of a t-SNE map; more take longer and hide each other in a column's width."""
 PERPLEXITY = 30.0
 ITERATIONS = 1000
 
 
 def confusion(group: Group) -> Sketch:
-    """Draw confusion matrices, one row for each sensor: left the validation set, if there is one, right the test."""
+    """Draw confusion matrices, one row of panels for each sensor: validation set, if any, and test set."""
     shown = group.panels
     roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
@@ -60,7 +60,7 @@ def confusion(group: Group) -> Sketch:
 
 
 def _confusion(panel: Panel, role: str) -> IntArray | None:
-    """Return (true, predicted) counts: of the test set the row's own, of the validation set where there is one."""
+    """Return the (classes, classes) counts by true and predicted class for a role; None without its answers."""
     table: IntArray = np.asarray(panel.row["confusion"], dtype=np.int64)
     if role == "test":
         return table
@@ -86,12 +86,12 @@ def _squares(here: Axes, table: IntArray, classes: list[Any]) -> None:
 
 
 def class_name(one: Any) -> str:
-    """Return the text of a class."""
+    """Return a class as text for a label, numbers without trailing zeros."""
     return f"{one:g}" if isinstance(one, int | float) else str(one)
 
 
 def embedding(group: Group) -> Sketch:
-    """Draw the t-SNE of the features that an estimator read, one row for each sensor: left by class, right by force.
+    """Draw t-SNE maps of an estimator's features, one row of panels for each sensor: left by class, right by force.
 
     Raises
     ------
@@ -133,18 +133,18 @@ def embedding(group: Group) -> Sketch:
 
 
 def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArray, FloatArray]:
-    """Return (points,) rows of a cell's test set and (points, 2) the t-SNE [1]_ of their features.
+    """Return (points,) indices of test rows of a cell, and (points, 2) the t-SNE [1]_ of their features.
 
     Raises
     ------
     NotApplicable
-        If the test set is in several folds, each with features of its own, or recordings are classified by a vote.
+        If the test set consists of folds with different scaling, or recordings are classified by a vote.
     DataError
-        If the recordings are not those the cell was answered from.
+        If the recordings differ from those that the cell was evaluated on.
 
     Notes
     -----
-    Every n-th row, n the smallest that leaves at most `AT_MOST`. Computed on one thread, since t-SNE is chaotic and the
+    Every n-th row is used, n the smallest that leaves at most `AT_MOST`. One thread is used: t-SNE is chaotic and the
     order of summation changes the last bits.
 
     References
@@ -152,7 +152,7 @@ def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[Int
     .. [1] van der Maaten and Hinton 2008, Visualizing data using t-SNE.
     """
     if np.ptp(test.fold):
-        raise NotApplicable(f"split {row['split']!r} has a test set a fold, and no two are scaled alike")
+        raise NotApplicable(f"split {row['split']!r} has one test set for each fold, scaled differently")
     rows = np.arange(0, len(test), -(-len(test) // AT_MOST), dtype=np.int64)
     features = _features(results, row, test)[rows]
     model = importlib.import_module("sklearn.manifold").TSNE(
@@ -165,17 +165,17 @@ def _embedded(results: Results, row: dict[str, Any], test: Answers) -> tuple[Int
 
 
 def _features(results: Results, row: dict[str, Any], test: Answers) -> FloatArray:
-    """Return (n, features) of the test set as the estimator read them: kept, scaled and filtered by the protocol."""
+    """Return the (n, features) test set as given to the estimator: selected, scaled and filtered by the protocol."""
     task = results.registry.tasks[row["task"]].spec
     estimator = results.registry.estimators[row["estimator"]]
     paths = results.recordings(row)
     data = load_task(task, paths, row["protocol"], row["split"], estimator=estimator, seed=row["seed"])
     if data.data.vote:
-        raise NotApplicable("a recording is answered by its frames, and has no features of its own")
+        raise NotApplicable("a recording is classified by a vote of its frames, and has no features of its own")
     k = int(row["chosen"].get("k", with_windows(estimator, task, data.rules).window_grid[0]))
     test_part = prepared(data.assignments[0], data.data, data.rules, k, Counter()).test
     if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):
         raise DataError(
-            f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."
+            f"The recordings of {row['cell']} have changed since it was evaluated.", hint="Run the cell again."
         )
     return features_of(test_part, estimator)

@@ -1,4 +1,4 @@
-"""Groups the cells of one figure, which differ only in their sensor, and writes its heading and caption."""
+"""Groups of cells that share a figure and differ only in their sensor, with heading and caption of the figure."""
 
 from __future__ import annotations
 
@@ -23,41 +23,41 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LINE = 64
-"""Largest number of characters that fit above a column."""
+"""Largest number of characters of a line of a heading above a figure of one column."""
 MARKS = {
     "simulated": "SIM: simulated, no hardware was touched.",
     "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
 }
-"""Explanation of each mark, by the key of a row that it stands for."""
+"""Explanations of the marks in figures, by the key of a row that sets the mark."""
 
 
 class Sketch(NamedTuple):
-    """A figure before it is saved."""
+    """A figure that has been drawn and not yet saved, with its title and caption."""
 
     name: str
-    """Name of its files, unique among the figures of a folder."""
+    """Name of the figure's files without suffix, unique in a folder."""
     title: str
     caption: str
     figure: Figure
 
 
 class Panel(NamedTuple):
-    """The cell of one sensor, with its answers."""
+    """The cell of one sensor in a figure, with its answers."""
 
     row: Row
-    """Row of the replicate that is shown."""
+    """Row of the replicate shown in the figure."""
     answers: Mapping[str, Answers]
-    """Answers by role."""
+    """Answers by role: train, validation, test."""
 
     @property
     def sensor(self) -> str:
-        """Return the name of the sensor."""
+        """Name of the panel's sensor."""
         return str(self.row["sensor"])
 
 
 @dataclass(frozen=True)
 class Group:
-    """The cells of one figure, in the order of the rows."""
+    """The cells of one figure, one for each sensor, in the order of the result rows."""
 
     results: Results
     task: TaskSpec
@@ -65,22 +65,22 @@ class Group:
 
     @property
     def row(self) -> Row:
-        """Return the row of the first panel, which shares task, protocol, split and estimator with all others."""
+        """Row of the first panel; task, protocol, split and estimator are the same in all panels."""
         return self.panels[0].row
 
     @cached_property
     def colours(self) -> dict[str, str]:
-        """Return a colour for each sensor, the same in all figures of the folder."""
+        """Colour of each sensor by name, the same in all figures of the folder."""
         return sensor_colours(self.results.rows)
 
     @property
     def metric(self) -> str:
-        """Return the name of the metric as tables write it."""
+        """Name of the task's metric as in tables, such as RMSE."""
         return METRIC_NAMES.get(self.task.metric, self.task.metric)
 
     @property
     def quantity(self) -> str:
-        """Return the quantity that the task predicts, in words."""
+        """Quantity predicted in the task, in words."""
         target = self.task.target
         if isinstance(target, SlipTarget):
             return "state of slip"
@@ -91,12 +91,12 @@ class Group:
 
     @property
     def unit(self) -> str:
-        """Return the unit of the predicted quantity."""
+        """Unit of the predicted quantity."""
         target = self.task.target
         return target.unit if isinstance(target, LabelTarget) else self.task.unit
 
     def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
-        """Return the group's figure of a kind with its heading; the caption ends with an explanation of its marks."""
+        """Return the group's figure with its name and heading; explanations of marks are appended to the caption."""
         row = self.row
         words = [kind, row["task"], row["protocol"], row["split"], answer_name(row)]
         words += [] if row["simulated"] else [row["rig"]]
@@ -114,16 +114,16 @@ class Group:
 
 
 def with_unit(words: str, unit: str) -> str:
-    """Return the label of an axis."""
+    """Return the label of an axis: `words [unit]`, without the unit if it is 1."""
     return words if unit == "1" else f"{words} [{unit}]"
 
 
 def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
-    """Return the groups of finished cells, one for each set of figures.
+    """Return the groups of finished cells, one group for each set of figures.
 
-    Of several estimators, the one that is comparable with a published number is shown, or else the one with the best
-    score; of several replicates, the one whose answers are stored with the cell's row. `remark` is called with a
-    sentence on what is not shown.
+    Of several estimators, one that is comparable with a published number is shown, or else the estimator with the best
+    score; of several replicates, that whose answers are stored with the cell's row. `remark` is called with a
+    sentence on each omission.
     """
     for trouble in results.store.troubles:
         remark(trouble)
@@ -146,7 +146,7 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
             if "test" in stored:
                 panels.setdefault(row["sensor"], Panel(results.replicate(row), stored))
             else:
-                remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
+                remark(f"{row['cell']} is not drawn: cells/{row['key']}.h5 cannot be read. Run the cell again.")
         if panels:
             found.append(Group(results, task, tuple(panels.values())))
     return found

@@ -1,4 +1,4 @@
-"""Draws the first figure of a report: published scores beside ours, one panel a task."""
+"""First figure of a report: published scores beside ours, one panel for each task."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 NAME = "published-and-ours"
 _LINE_IN = 0.24
-"""Height of a row of the picture."""
+"""Height of a row of the figure [inch]."""
 
 
 def draw_published(results: Results) -> Sketch | None:
-    """Draw each published score beside ours and those of our replicates; return None if no row is comparable."""
+    """Draw published scores beside ours and those of our replicates; return None if no scores are comparable."""
     lines = [line for line in reproduce(results.registry, results.rows) if line.row["status"] == "done"]
     if not lines:
         return None
@@ -43,7 +43,7 @@ def draw_published(results: Results) -> Sketch | None:
 
 
 def _panel(here: Axes, lines: Sequence[Reproduction], colours: Mapping[str, str]) -> None:
-    """Draw one task: one row for each published number and sensor, the first on top."""
+    """Draw the panel of a task: one row for each published score and sensor, the first on top."""
     for place, line in enumerate(lines):
         row, colour = line.row, colours[line.row["sensor"]]
         scores = row.get("replicate_scores") or []

@@ -1,4 +1,4 @@
-"""Figures of a regression as in the paper: predictions against time and against the target."""
+"""Figures of regression results as in the paper: predictions against time and against the target."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from tactbench.core.tables.numbers import score_with_unit, suffix
 
 
 def prediction_against_time(group: Group) -> Sketch:
-    """Draw predictions against time, one row a sensor: left of the training set, right of the test set.
+    """Draw predictions against time, one row of panels for each sensor: left the training set, right the test set.
 
     Raises
     ------
     NotApplicable
-        If no sensor has answers on its training set: the split has several folds.
+        If there are no answers on a training set, since the split has several folds.
     """
     shown = [panel for panel in group.panels if "train" in panel.answers]
     if not shown:
-        raise NotApplicable(f"split {group.row['split']!r} has a training set a fold; none stands for all")
+        raise NotApplicable(f"split {group.row['split']!r} has one training set for each fold, not a common one")
     figure, axes = panels(len(shown), 2, 1.35, sharey="row")
     for line, panel in zip(axes, shown, strict=True):
         for here, role in zip(line, ("train", "test"), strict=True):
@@ -57,7 +57,7 @@ def prediction_against_time(group: Group) -> Sketch:
 
 
 def end_to_end(answers: Answers) -> FloatArray:
-    """Return (n,) times, each recording of the set beginning where the one before it ended."""
+    """Return (n,) times [s] in which each recording begins where the previous recording ended."""
     time = answers.time_s.astype(np.float64)
     offset = 0.0
     for one in np.unique(answers.recording):
@@ -68,7 +68,7 @@ def end_to_end(answers: Answers) -> FloatArray:
 
 
 def residuals(group: Group) -> Sketch:
-    """Draw the test set's predictions against their targets, one panel a sensor, or a component of its answers."""
+    """Draw the test set's predictions against their targets, one panel for each sensor or component of its answers."""
     shown = list(_components(group))
     columns = min(2, len(shown))
     figure, axes = panels(-(-len(shown) // columns), columns, 2.3, sharex=True, sharey=True)
@@ -91,14 +91,14 @@ def residuals(group: Group) -> Sketch:
         here.set_ylabel(with_unit("predicted", unit))
     bias = "; ".join(f"{title} {np.mean(predicted - true):+.3g}" for _, title, true, predicted, _ in shown)
     caption = (
-        f"Predicted against target {group.quantity}, a dot a row of the test set. Perfect predictions lie on the "
+        f"Predicted against target {group.quantity}, one dot for each test row. Perfect predictions lie on the "
         f"black line. Mean of prediction minus target: {bias}{suffix(unit)}."
     )
     return group.sketch("residuals", f"How far off is the predicted {group.quantity}?", caption, figure)
 
 
 def _components(group: Group) -> Iterator[tuple[str, str, FloatArray, FloatArray, str]]:
-    """Yield sensor, title, targets, predictions and error of what each panel shows."""
+    """Yield (sensor, title, targets, predictions, text of the error) for each panel."""
     target, unit = group.task.target, group.task.unit
     for panel in group.panels:
         true, predicted = panel.answers["test"].y_true, panel.answers["test"].y_pred

@@ -1,4 +1,4 @@
-"""Style of all figures: a column wide, letters of seven points, colours that colour-blind readers distinguish."""
+"""Style of all figures: one column wide, letters of 7 pt, colours that colour-blind readers can distinguish."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN_IN = 3.5
-"""Width of a column of a two-column paper; all sizes are meant at this width."""
+"""Width of a column of a two-column paper [inch]; font and line sizes are chosen for this width."""
 PAGE_IN = 7.16
-"""Width of both columns, for what does not fit in one."""
+"""Width of both columns [inch], for figures that do not fit into one column."""
 FONT_PT = 7.0
 PNG_DPI, RASTER_DPI = 150, 300
-"""Resolution of a PNG, and of dense clouds of points inside a PDF."""
+"""Resolution of PNG files, and of rasterised point clouds inside PDF files [dots per inch]."""
 
 BLACK, GREY = "#000000", "#767676"
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", BLACK)
-"""Colours without an order: Okabe and Ito 2008, Color universal design."""
+"""Colours for categories: Okabe and Ito 2008, Color universal design."""
 MARKERS = "os^DvPX*<>"
 
 _RC: dict[str, Any] = {
@@ -44,7 +44,7 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Set the style of figures inside of the context, whatever the user's matplotlibrc sets."""
+    """Return a context in which figures have this style, independent of the user's matplotlibrc."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -54,7 +54,7 @@ def styled() -> Iterator[None]:
 
 
 def save(figure: Figure, place: Path) -> Path:
-    """Write ``PLACE.png`` and ``PLACE.pdf``, each whole, and return the first; the same figure is the same bytes."""
+    """Write ``PLACE.png`` and ``PLACE.pdf`` and return the path of the PNG; equal figures give equal bytes."""
     # Without dates, and without the version of what drew it.
     apart = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None}}
     for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
@@ -68,7 +68,7 @@ def save(figure: Figure, place: Path) -> Path:
 def panels(
     rows: int, columns: int, height_in: float, *, width_in: float = COLUMN_IN, **more: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure and its (rows, columns) axes, each row `height_in` high."""
+    """Return a figure and its (rows, columns) axes, each row `height_in` inches high."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width_in, rows * height_in + 0.35), layout="constrained")
@@ -76,20 +76,20 @@ def panels(
 
 
 def ordered(n: int) -> list[Any]:
-    """Return `n` colours whose order is visible in grey too; the ends, which vanish on paper, are left out."""
+    """Return `n` colours that are ordered in greyscale too, without the palest, which would vanish on paper."""
     import matplotlib
 
     return [matplotlib.colormaps["viridis"](value) for value in np.linspace(0.0, 0.88, n)]
 
 
 def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Return a colour for each sensor of a folder, the same in all its figures."""
+    """Return a colour for each sensor in the rows of a folder, the same for all its figures."""
     names = sorted({str(row["sensor"]) for row in rows})
     return {name: LINES[place % len(LINES)] for place, name in enumerate(names)}
 
 
 def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
-    """Add a legend below a figure with each label of its panels once."""
+    """Add a legend below a figure, with each label of its panels listed once."""
     entries: dict[str, Any] = {}
     for here in shown:
         handles, labels = here.get_legend_handles_labels()

@@ -1,4 +1,4 @@
-"""Figures and tables of what accuracy costs in time: settings that `cost` varies, errors of a simulated rig."""
+"""Figures and tables of accuracy against time: settings varied by `tactbench cost`, errors of a simulated rig."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 ACROSS = {
     "answer_delay_ms": "answer delay [ms]", "fit_s": "training: one fit [s]", "sim_s": "simulating one campaign [s]",
 }  # fmt: skip
-"""Label of the axis of each time."""
+"""Axis label of each kind of time, by key of a record."""
 
 
 def draw_trade(known: Mapping[str, Any]) -> Figure:
-    """Return the figure, in the style that is set: a panel for each time, in it a path for each knob that costs it.
+    """Return the figure of score against time: a panel for each kind of time, with a path for each setting varied.
 
-    Along each path one setting changes and all others stay as they are. Upwards is the median over replicates with its
-    interval; the dashed line is the best answer that looks at nothing.
+    Along a path one setting changes and all others keep their defaults. Upwards is the median over replicates with its
+    interval; the dashed line is the best score without any input.
     """
     shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
     times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
@@ -56,7 +56,7 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
 
 
 def title_of(known: Mapping[str, Any]) -> str:
-    """Return a title with everything that all settings share."""
+    """Return a title with the sensor, task, protocol and number of replicates that all settings share."""
     simulated = " · SIM" if known["simulated"] else ""
     several = f"{known['replicates']} replicates" if known["replicates"] > 1 else "one replicate"
     bars = ", bars: 95 %" if any(one["ci_low"] is not None for one in known["settings"]) else ""
@@ -64,9 +64,9 @@ def title_of(known: Mapping[str, Any]) -> str:
 
 
 def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
-    """Return the figure of a simulated rig, in the style that is set: error against seconds, one panel an observable.
+    """Return the figure of a simulated rig: error against seconds per recording, one panel for each observable.
 
-    The grey line joins the points that no other one beats in both; the dashed line is a third of the observable's
+    The grey line joins the points that no other point beats in both; the dashed line is a third of the observable's
     noise.
     """
     found = diagrams(points)
@@ -93,7 +93,7 @@ def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
 
 
 def _plain_numbers(axis: Any) -> None:
-    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers."""
+    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers of ten."""
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
 
@@ -103,7 +103,7 @@ def _family(point: CostPoint) -> str:
 
 
 def _least(point: CostPoint) -> float:
-    """Return an error that a logarithmic axis can show."""
+    """Return the error of a point, at least 1e-12 so that a logarithmic axis can show it."""
     return max(point.error, 1e-12)
 
 
@@ -111,7 +111,7 @@ def _path(
     here: Axes, across: Sequence[float], upwards: Sequence[float], place: int, name: str, texts: Sequence[str], *,
     joined: bool,
 ) -> None:  # fmt: skip
-    """Draw points with a text at each, joined by a line where one setting changes along them."""
+    """Draw points with one text each, joined by a line if `joined`."""
     colour, mark = LINES[place % len(LINES)], MARKERS[place % len(MARKERS)]
     here.plot(across, upwards, mark + "-" * joined, color=colour, markersize=4, linewidth=1.0, label=visible(name))
     for text, x, y in zip(texts, across, upwards, strict=True):
@@ -123,13 +123,13 @@ _COLUMNS = {
     "knob": "", "setting": "", "front": "", "score": "score", "95 % interval": "ci_low",
     "answer delay": "answer_delay_ms", "training": "fit_s", "simulation": "sim_s", "remark": "",
 }  # fmt: skip
-"""Key of the number behind each column; empty for a column of words."""
+"""Key of the number by which a column is sorted; empty for a column of words."""
 
 
 def trade_table(known: Mapping[str, Any]) -> TextTable:
-    """Return the result of `tactbench.core.cost.knobs.measure` as a table; raises KeyError where its file is damaged.
+    """Return the result of `tactbench.core.cost.knobs.measure` as a table; raises KeyError if a key is missing.
 
-    The front is of the settings that no other one beats in both score and answer delay.
+    The front consists of the settings that no other setting beats in both score and answer delay.
     """
     lines = []
     for one in known["settings"]:
@@ -153,7 +153,7 @@ def trade_table(known: Mapping[str, Any]) -> TextTable:
 
 
 def write_trade(known: Mapping[str, Any], place: Path) -> None:
-    """Write the measured settings as ``PLACE.json``, and their figure as ``.png`` and ``.pdf``.
+    """Write the measured settings as ``PLACE.json``, and their figure as ``PLACE.png`` and ``PLACE.pdf``.
 
     Raises
     ------
