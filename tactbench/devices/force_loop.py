@@ -68,7 +68,7 @@ class ForceLaw:
             and all(value > 0 for value in positive)
             and self.travel[0] < self.travel[1]
         ):
-            raise UsageError(f"The force loop has a negative gain, no gain or wrong limit: {self}.", hint="Correct it.")
+            raise UsageError(f"A number of the force loop is not valid: {self}.", hint="Give gains and limits above 0.")
 
     def kept(self, passed_s: float) -> float:
         """Return a, the part (0 to 1) of its last value that the filter keeps after a time."""

@@ -415,8 +415,8 @@ class Positioner(Driver):
         if far and last is not None:
             self.homed = False
             raise PositionerError(
-                f"The position has gone from {last.position:g} to {state.position:g}, faster than it can move: it has "
-                "lost its place, or was restarted.",
+                f"The position went from {last.position:g} to {state.position:g}, faster than it can move: the axis "
+                "has lost steps, or was restarted.",
                 hint="Check that nothing is touched, and home the axis again.",
             )
 

@@ -33,7 +33,7 @@ Features = Mapping[str, float]
 
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
-    """Return True if each recording becomes one row of summaries; False under a protocol that keeps the first row."""
+    """Return True if each recording is reduced to one row of summaries, and not to its first row by the protocol."""
     return task.answer_per == "recording" and bool(task.summaries or task.features_by) and not rules.first_row_only
 
 

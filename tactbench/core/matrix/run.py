@@ -77,7 +77,7 @@ class EngineChoice:
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
     def recorder(self, *, computed: bool) -> Engine:
-        """Return the engine that makes recordings; with devices one at a time, and with time to close the devices."""
+        """Return the engine that makes recordings: with devices one at a time, and with time to close each device."""
         if self.name == "in-process":
             return InProcess()
         return Pool(self.processes, self.limits) if computed else Pool(1, replace(self.limits, grace_s=GRACE_S))

@@ -181,7 +181,8 @@ class Nuisances(Frozen):
         try:
             return Nuisances.model_validate(data)
         except ValidationError as error:
-            raise UsageError(f"{kind}: {complaint(error)}.", hint="Set the time constant as well.") from error
+            hint = "Set an amount and its time constant together."
+            raise UsageError(f"{kind}: {complaint(error)}.", hint=hint) from error
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation of white noise plus rounding, in the channel's unit."""
@@ -273,7 +274,7 @@ class SensorSpec(Frozen):
         for first, *others in self.sites():
             for one in others:
                 if (one.position_m, one.normal) != (first.position_m, first.normal):
-                    raise ValueError(f"site {one.site}: {one.name} and {first.name} must have one place")
+                    raise ValueError(f"site {one.site}: {one.name} and {first.name} must state the same place")
         return self
 
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:

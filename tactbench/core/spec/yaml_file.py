@@ -38,7 +38,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
         reason = getattr(error, "strerror", "") or "it is not UTF-8 text"
         raise ConfigError(file, None, f"cannot be read: {reason}.", hint="Check the path and the file.") from error
     if node is None:
-        raise ConfigError(file, None, "is empty.", hint="Write settings into it; docs/ has examples.")
+        raise ConfigError(file, None, "is empty.", hint="Write the settings into the file; docs/ has examples.")
     places: Places = {}
     _collect_places(node, (), places, file)
     try:

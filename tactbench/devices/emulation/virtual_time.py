@@ -63,7 +63,7 @@ class _VirtualLink(Link):
     def __init__(self, name: str, time: VirtualTime, line: Line) -> None:
         super().__init__(f"emulated {name}", time)
         if line.deliver is not None:
-            raise LinkError(f"The link {self.address} is open already.", hint="Close its first user.")
+            raise LinkError(f"The link {self.address} is open already.", hint="Close the driver that opened it first.")
         self._time = time
         self._line = line
         self._arrived: deque[tuple[int, Piece]] = deque()

@@ -251,7 +251,7 @@ def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
 
 
 def margins(delta: LinearDelta, p_m: FloatArray) -> dict[str, FloatArray]:
-    """Return, by name of the limit, (n,) distances from it at (n, 3) places [m], in m, rad or 1; below 0: exceeded."""
+    """Return by name of each limit the (n,) margins to it at (n, 3) places [m]; a negative margin exceeds the limit."""
     q, shortfall = solve_inverse(delta, p_m)
     found = measures(delta, p_m, q)
     low, high = delta.joint_range
@@ -281,7 +281,7 @@ def check_move(delta: LinearDelta, start_m: FloatArray, end_m: FloatArray) -> No
         if (left < 0).any():
             place = ", ".join(f"{1e3 * x:.2f}" for x in places[np.argmax(left < 0)])
             raise PlaceRefusedError(
-                f"({place}) mm is not permitted: {name} beyond its limit.",
+                f"The place ({place}) mm is not permitted: {name} would exceed its limit.",
                 hint="Nothing has moved. Choose another place or another path.",
             )
 

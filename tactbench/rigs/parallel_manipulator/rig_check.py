@@ -174,7 +174,7 @@ def _axis_row(options: Any) -> tuple[str, ...]:
 
 
 def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str]:
-    """Return a problem if an increment takes longer on the line than assumed for the force loop."""
+    """Return a problem if sending an increment to the motor takes longer than assumed for the force loop."""
     loop, exchange_ms = settings.force_loop, 1e3 * line_time_s(INCREMENT_BYTES, options.baud)
     allowed_ms = 1e3 / loop.rate_hz + loop.delay_ms
     if exchange_ms <= allowed_ms:

@@ -79,7 +79,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
 
 @hookimpl
 def tactbench_indenters() -> list[IndenterDescriptor]:
-    """Return the descriptors of the usual indenters; scenes store a cap as a radius, a flat surface as no radius."""
+    """Return the descriptors of the usual indenters; a scene stores the radius of a cap, and none of a flat surface."""
     radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
     return [
         _indenter("cap", "Spherical cap", radius=radius),

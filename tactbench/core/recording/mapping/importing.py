@@ -412,6 +412,6 @@ def _in_place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imp
             with suppress(RecordingError):
                 there = content_digest(target)
             if there != content_digest(one.path):
-                raise MappingError(f"{target} exists already and has other content.", hint=_OTHERWISE)
+                raise MappingError(f"{target} exists already, and differs from what would be written.", hint=_OTHERWISE)
             one.path.unlink()
     return [replaced(one, path=out / one.path.name) for one in made]

@@ -170,7 +170,7 @@ class OperationStatus(IntFlag):
 
 
 class Configuration(IntFlag):
-    """Bits of the answer to CST that a public driver names (sourced); others are ignored."""
+    """Status bits in the answer to the command CST, as a public driver names them; other bits are ignored."""
 
     ACKNOWLEDGES = 1 << 2
     POWER_STAGE = 1 << 10

@@ -57,7 +57,7 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
     if error <= 2 * (1 - TABLE_SHARE) * tolerance:
         return last, error / 2
     raise RigError(
-        f"No contact solver keeps the scene's tolerance {tolerance:g}: the finest errs by about {error / 2:.2g}.",
+        f"No contact solver keeps the scene's tolerance {tolerance:g}: the finest is off by {error / 2:.2g}.",
         hint="Give a larger tolerance, or a sensor spec with more cells.",
     )
 

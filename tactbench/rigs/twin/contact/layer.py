@@ -61,9 +61,9 @@ def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray,
 
 
 def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
-    """Return the layer's medium on `grid`: ``K = E* k / (2 M(k h))``, and ``E_oed / h`` for a uniform pressure.
+    """Return the layer of thickness h as a medium of stiffness ``K = E* k / (2 M(k h))`` at wavenumber k on `grid`.
 
-    An incompressible layer does not yield to a uniform pressure: its mean deflection is held at zero.
+    For a uniform pressure it is ``E_oed / h``. The mean deflection of an incompressible layer is zero.
     """
     young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
     spectrum = Spectrum(grid)

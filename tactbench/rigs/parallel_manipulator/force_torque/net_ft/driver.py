@@ -97,7 +97,7 @@ class NetFtDriver(Driver):
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
         if every != self.options.every:
             raise RigError(
-                f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected is every "
+                f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, the rig file expects every "
                 f"{self.options.every}th (rate_hz: {self.options.rate_hz:g}).",
                 hint=f"Set the RDT rate on the box's web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
             )
