@@ -127,7 +127,7 @@ def test_the_way_until_a_dead_force_is_noticed_is_of_the_softest_skin():
 def test_forces_are_computed_with_the_age_that_the_force_may_have():
     def of_an_approach(age_ms):
         (_, forces) = check(file_of(settings__limits__force_age_ms=age_ms)).tables
-        (row,) = [value for what, value in forces.rows if "misses" in what]
+        (row,) = [value for what, value in forces.rows if "approach" in what]
         return float(row.split()[0])
 
     # 0.5 mm/s on 90 N/mm for 100 ms more; printed to 0.01 N.
