@@ -208,13 +208,12 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
     ]  # fmt: skip
     if file is None or not names:
         return None
-    how, known = file.emulation, {"factor": factor, "devices": tuple(names)}
+    how = file.emulation
+    known = {"time": "virtual" if file.emulated else "real", "factor": factor, "devices": tuple(names)}
     if not (file.emulated or how.control):
-        return Emulation(time="real", **known)
+        return Emulation(**known)
     faults = tuple(f"{name}: {fault}" for name in names for fault in file.entries()[name].faults)
-    return Emulation(
-        time="virtual" if file.emulated else "real", seed=how.seed, physics=how.physics, faults=faults, **known
-    )
+    return Emulation(seed=how.seed, physics=how.physics, faults=faults, **known)
 
 
 def _meta(acquisition: Acquisition, request: RecordingRequest) -> RecordingMeta:
