@@ -38,7 +38,7 @@ class HostItem:
 
 def look_at_host() -> list[HostItem]:
     """Return the resources of this machine; takes about half a second, opens no device."""
-    return [*serial_ports(), *spi_devices(), *can_interfaces(), *network(), *extras(), clock()]
+    return [*serial_ports(), *can_interfaces(), *network(), *extras(), clock()]
 
 
 def serial_ports() -> Iterator[HostItem]:
@@ -54,15 +54,6 @@ def serial_ports() -> Iterator[HostItem]:
             *stable,
         )
         yield _device("serial port", port.device, ", ".join(filter(None, texts)))
-
-
-def spi_devices() -> Iterator[HostItem]:
-    """Yield the SPI devices of a Linux machine."""
-    paths = sorted(Path("/dev").glob("spidev*"))
-    yield from (_device("SPI", str(path)) for path in paths)
-    if not paths:
-        hint = "A bridge on a serial port needs no SPI device: see docs/links.md."
-        yield HostItem("SPI", "spidev", "missing", "no /dev/spidev*", hint)
 
 
 def _device(kind: str, path: str, text: str = "") -> HostItem:

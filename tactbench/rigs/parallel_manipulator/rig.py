@@ -42,13 +42,12 @@ from tactbench.plugin.devices import (
     StreamCounts,
     ask_operator,
     physics_of,
-    read_options,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
 from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.session import Session
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, axis_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, ScenePhysics
@@ -182,8 +181,8 @@ class ParallelManipulator(Rig):
         self._file, self._operator, self._physics, self._registry = file, operator, physics, load_registry()
         self._session: Session | None = None
         limited, self.settings = with_limits(file, self._registry)
-        kind, options = positioner_of(self._registry, MOTOR, limited.devices[MOTOR])
-        self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
+        kind, options = axis_of(self._registry, MOTOR, limited.devices[MOTOR])
+        self._facts = kind.facts_of(options)
 
     def close(self) -> None:
         """End the session, if one is open: disarm the guard and close all devices."""

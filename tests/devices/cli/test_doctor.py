@@ -44,7 +44,7 @@ def test_what_does_not_work_comes_first_and_what_works_in_one_line(doctor):
     named = {(one["kind"], one["name"]): one for one in about["host"]}
     assert [name for kind, name in named if kind == "serial port"] == sorted(port.device for port in comports())
     assert "5 ms" in named["clock", "clock"]["text"]
-    assert {"dask", "mcap", "spi"} <= {name for kind, name in named if kind == "extra"}
+    assert {"dask", "mcap"} <= {name for kind, name in named if kind == "extra"}
 
 
 def test_what_is_wrong_with_the_devices_of_a_rig_file_comes_first_and_what_is_emulated_is_not_opened(tmp_path, doctor):

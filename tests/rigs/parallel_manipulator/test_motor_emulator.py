@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.rigs.parallel_manipulator.motor.codec import encode, line_time_s
-from tactbench.rigs.parallel_manipulator.motor.drive import Motion
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
+from tactbench.rigs.parallel_manipulator.motor.emulator import Motion, MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 

@@ -31,7 +31,7 @@ class Answer(NamedTuple):
     """Outcome of a command: the answer, or its absence."""
 
     name: str
-    argument: int | None
+    command: str
     of: int | None
     """Number that was given to `send` with the command."""
     line: Line | None = None
@@ -44,15 +44,14 @@ class Answer(NamedTuple):
 
     def checked(self) -> Line:
         """Return the line; raises PositionerSilentError if no answer came, MotorRefusalError if the drive refuses."""
-        text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
             raise PositionerSilentError(
-                f"The motor's drive did not answer {text} in time; it may have carried it out.",
+                f"The motor's drive did not answer {self.command} in time; it may have carried it out.",
                 hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
             raise MotorRefusalError(
-                f"The motor's drive refuses {text}: {self.line.text}.",
+                f"The motor's drive refuses {self.command}: {self.line.text}.",
                 hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
             )
         return self.line
@@ -100,8 +99,9 @@ class Exchange:
         """Send a command now, even if answers are outstanding: the drive keeps the order. The answer carries `of`."""
         if not self._out:
             self._since_ns = self._clock()
-        self._link.write(encode(name, argument))
-        self._out.append(Answer(name, argument, of))
+        command = encode(name, argument)
+        self._link.write(command)
+        self._out.append(Answer(name, command.decode().strip(), of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
         """Read lines, waiting at most `timeout_s` for the first byte; return the outcomes of commands.
