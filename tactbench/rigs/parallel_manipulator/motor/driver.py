@@ -193,7 +193,7 @@ class FaulhaberDriver(Positioner):
         """
         if self.moving or _ENDS[0] not in self._settings:
             raise NotReadyError(
-                f"The motor {'is moving' if self.moving else 'has no ends of travel'}.",
+                "The motor is moving, or has no ends of travel.",
                 hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
             )
         options, self.homed = self.options, False

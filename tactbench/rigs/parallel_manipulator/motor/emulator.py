@@ -148,8 +148,7 @@ class Drive:
         self.settings = {  # assumed
             "SP": options.speed(0.05), "AC": options.acceleration(1.0), "DEC": options.acceleration(1.0),
             "LPC": options.current(PEAK_CURRENT_A), "LCC": options.current(CONTINUOUS_CURRENT_A),
-            "GNL": options.increments(low - begin_m), "GPL": options.increments(high - begin_m),
-            "CORRIDOR": 20, "APL": 0, "ANSW": 2, "SOR": 0,
+            "GNL": 0, "GPL": 0, "CORRIDOR": 20, "APL": 0, "ANSW": 2, "SOR": 0,
         }  # fmt: skip
         self.hot = self.enabled = self._at_speed = False
         self._motion = Motion(0.0, begin_m)

@@ -131,24 +131,20 @@ class Exchange:
         return found[0]
 
     def greet(self) -> str:
-        """Find the drive: end a partial command on its line, and read its version until two answers agree.
+        """Find the drive: end a partial command on its line, and read its version twice.
 
         Raises
         ------
         LinkTimeout
-            If the drive does not answer.
+            If the drive does not answer, or not twice the same.
         """
         self._link.write(b"\r")
         self.quiet()
-        self.version, before = "", ""
-        for _ in range(5):
-            line = self.ask(MARK).line
-            if line is None:
-                self.quiet()
-            elif line.text == before and line.kind is not Kind.REFUSAL:
-                self.version = before
-                return before
-            before = "" if line is None else line.text
+        self.version = ""
+        first, second = (self.ask(MARK).line for _ in range(2))
+        if first is not None and second is not None and first.text == second.text and first.kind is not Kind.REFUSAL:
+            self.version = first.text
+            return first.text
         raise LinkTimeout(
             f"No drive on {self._link.address} gives the same answer to {MARK} twice.",
             hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "
