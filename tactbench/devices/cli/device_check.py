@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.conformance.streams import good, joined, marks_of
+from tactbench.core.conformance.streams import RATE_SHARE, good, joined, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
@@ -22,11 +22,6 @@ from tactbench.links.link import Clock
 
 READ_S = 0.25
 """Longest wait of one read of a driver [s]."""
-RATE_TOLERANCE = 0.02
-"""Largest relative error of a right rate. Assumed: quartz is a hundred times better, a timer of
-whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
-HELD_S = 0.016
-"""Longest time for which a usual USB serial adapter holds data back (default of FTDI's latency timer) [s]."""
 _CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connected?)",
            "SUSPECT": " (cable, shield, ground?)", "SATURATED": " (is something touching it?)"}  # fmt: skip
 
@@ -110,8 +105,8 @@ def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[
     marks, hz, drift, problems = np.bitwise_or.reduce(marks_of(stream), axis=1), None, None, []
     if times is not None and times[-1] > times[0]:
         hz = float(np.count_nonzero(times > times[0]) / (times[-1] - times[0]) * 1e9)
-        allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * hz / rows
-        if stated_hz is not None and abs(hz / stated_hz - 1) > allowed:
+        # Rows that come together have one time: as many may be missing at either end.
+        if stated_hz is not None and abs(hz / stated_hz - 1) > RATE_SHARE + 2 / len(np.unique(times)):
             problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
         if stream.device_ns is not None:
             fit = ClockFit()
