@@ -31,7 +31,7 @@ from tactbench.core.samples import Block, FloatArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.emulator import Senses
 from tactbench.devices.rig_devices import emulated_device, open_driver
 from tactbench.devices.row_driver import RowDriver
