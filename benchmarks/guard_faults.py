@@ -155,7 +155,7 @@ class Pressed:
         )
         self.force.faults = faults.get("force", [])
         devices = {
-            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
+            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ()))),
             "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
         }
         self.devices = RealTimeDevices(devices) if setting.time == "real" else EmulatedDevices(devices)

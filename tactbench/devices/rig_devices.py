@@ -95,10 +95,8 @@ def emulated_device(
 
     of_link, of_device = split_faults(entry.faults)
     rng = np.random.default_rng([seed, *name.encode()])
-    options = options_of(descriptor, entry)
-    emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, options, of_device))
-    baud = options.get("baud")
-    return EmulatedDevice(descriptor.emulated_link, emulator, of_link, baud if isinstance(baud, int) else None)
+    settings = EmulatorSettings(own, rng, options_of(descriptor, entry), of_device)
+    return EmulatedDevice(descriptor.emulated_link, load_object(descriptor.emulator)(settings), of_link)
 
 
 def drivers_of(

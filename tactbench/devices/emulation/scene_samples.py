@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 
-from tactbench.core.samples import Block
+from tactbench.core.samples import Block, join_blocks
 from tactbench.core.spec.sensor import StreamSpec
 
 PRESSING_FORCE = "fz"
@@ -34,17 +34,14 @@ class SceneSamples:
     def __init__(
         self, streams: Sequence[StreamSpec], blocks: Iterable[Block], duration_s: float, *, rest_s: float = 0.0
     ) -> None:
-        import numpy as np
-
         self._end_ns, self._rest_ns = round(1e9 * duration_s), round(1e9 * min(rest_s, duration_s))
         self._start_s: float | None = None
         came, self._tracks = list(blocks), []
         for stream in streams:
-            own = [block for block in came if block.stream == stream.name and block.t_ns is not None]
-            if own:
-                times: list[int] = np.concatenate([block.t_ns for block in own if block.t_ns is not None]).tolist()
+            own = [block for block in came if block.stream == stream.name]
+            if own and (whole := join_blocks(own)).t_ns is not None:
                 names = tuple(channel.name for channel in stream.channels)
-                self._tracks.append((times, names, np.concatenate([block.data for block in own]).tolist()))
+                self._tracks.append((whole.t_ns.tolist(), names, whole.data.tolist()))
         self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
 
     def start(self, at_s: float) -> None:

@@ -36,8 +36,6 @@ class EmulatedDevice:
     """SpiDeviceEmulator for the link kind `spi`, DeviceEmulator for other kinds."""
     faults: tuple[LinkFault, ...] = ()
     """Faults of the link; faults of the device itself are in its emulator."""
-    baud: int | None = None
-    """Bit rate in the address of a serial line [bit/s]; None: above that of any device."""
 
     def far_end(self) -> DeviceEmulator:
         """Return the device's end of its link; an SPI device gets a bridge."""
