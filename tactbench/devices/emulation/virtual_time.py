@@ -98,7 +98,7 @@ class EmulatedDevices:
     """
 
     def __init__(self, devices: Mapping[str, EmulatedDevice]) -> None:
-        self._kinds = {name: one.link for name, one in devices.items()}
+        self._devices = dict(devices)
         self._lines = {name: Line(one.far_end(), one.faults) for name, one in devices.items()}
         self.clock = VirtualTime([*self._lines.values()])
 
@@ -116,7 +116,7 @@ class EmulatedDevices:
     def open_link(self, name: str) -> Link:
         """Open the host's end of a device's link; raises LinkError if it is open already."""
         kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}
-        kind = self._kinds[name]
+        kind = self._devices[name].link
         link = kinds.get(kind, VirtualByteLink)(name, self.clock, self._lines[name])
         return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
