@@ -17,11 +17,13 @@ from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.devices.driver import Driver, DriverSettings
 from tactbench.devices.emulation.line import split_faults
-from tactbench.devices.emulation.scene_samples import PRESSING_FORCE
 from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.devices.emulator import EmulatorSettings, Senses
 from tactbench.links.address import open_link
 from tactbench.links.link import Clock, Link
+
+PRESSING_FORCE = "fz"
+"""Channel name of the force on the sensor in simulated rigs [N], positive when pressing."""
 
 
 def with_sensor(file: RigFile, sensor: str) -> RigFile:
