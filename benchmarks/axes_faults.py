@@ -63,7 +63,7 @@ class Machine(faults.Pressed):
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
             self.rails[name] = MotorEmulator(None, rng, FaulhaberOptions(**RAIL), faults=given.get(name, []))
-            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())), 115200)
+            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())))
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock
 
