@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.core.conformance.streams import good, joined, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
+from tactbench.core.recording.clock_fit import fit, wrong_rate
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.devices.driver import Driver
@@ -114,9 +114,7 @@ def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[
         if stated_hz is not None and abs(hz / stated_hz - 1) > allowed:
             problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
         if stream.device_ns is not None:
-            fit = ClockFit()
-            fit.add(stream.device_ns, times)
-            drift = fit.segments()[-1].drift
+            drift = fit(stream.device_ns, times)[-1].drift
             if refused := wrong_rate(name, drift, round(1e9 * rows / hz)):
                 problems.append(f"{refused}. Correct device_ns in the device's driver.")
     marked = {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))}
