@@ -59,7 +59,6 @@ from tactbench.scoring import (
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
 
@@ -232,31 +231,6 @@ class Result(Results):
                 found[name] = labels[values] if len(labels) else values
         frame: pandas.DataFrame = library("pandas").DataFrame(found)
         return frame
-
-    def plot(self) -> Figure:
-        """Return a figure of predictions against true values, one panel for each component, or a confusion matrix.
-
-        Raises NotApplicable for events, whose figure is part of ``tactbench report``.
-        """
-        from matplotlib.figure import Figure
-        from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
-
-        if self.row["events"]:
-            raise NotApplicable("No figure is available for events.", hint="See row['operating_points'].")
-        frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
-        figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
-        for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):
-            part, unit = name.removeprefix("y_true").replace("_", " "), self.row["unit"]
-            drawn = {"y_true": frame[name], "y_pred": frame[name.replace("true", "pred")], "ax": axes}
-            if self.row["confusion"]:
-                more = {"values_format": ".2g", "colorbar": False, "xticks_rotation": "vertical", "cmap": "Blues"}
-                ConfusionMatrixDisplay.from_predictions(**drawn, normalize="true", **more)
-            else:
-                kind, points = "actual_vs_predicted", {"s": 4}
-                PredictionErrorDisplay.from_predictions(**drawn, kind=kind, subsample=None, scatter_kwargs=points)
-                axes.set(xlabel=f"answer{part} [{unit}]", ylabel=f"truth{part} [{unit}]")
-        figure.suptitle(f"{self.row['estimator']}: {self.row['metric']} {self.score:.3g}")
-        return figure
 
 
 def evaluate(
