@@ -14,13 +14,18 @@ from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
 from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite
+from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
 
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
     "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "n", "verdict",
 )  # fmt: skip
+_NOTE = (
+    "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
+    "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all comparisons "
+    "that the matrix declares, others are exploratory. n counts replicates."
+)
 _NAMES: dict[Kind, Callable[[Row], str]] = {
     "sensors": lambda row: str(row["sensor"]),
     "estimators": answer_name,
@@ -122,7 +127,7 @@ def with_declared(
 
 
 def _compared(
-    kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
+    kind: Kind, first: str, second: str, first_rows: Iterable[Row], second_rows: Iterable[Row]
 ) -> list[PairwiseComparison]:
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     return [_pair(kind, first, second, ones.get(key), others.get(key)) for key in dict.fromkeys([*ones, *others])]
@@ -130,16 +135,15 @@ def _compared(
 
 def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | None) -> PairwiseComparison:
     refused = ""
-    for name, row in ((second, other), (first, one)):
+    for name, row in ((first, one), (second, other)):
         if row is None:
             refused = f"{name} has no such cell on this rig, protocol and split"
         elif row["status"] != "done":
             refused = f"{name} {row['status']}: {row['reason']}"
-    if one is None or other is None or refused:
-        return PairwiseComparison(kind, first, second, one, other, refused)
-    if (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
-        return PairwiseComparison(kind, first, second, one, other, "they were scored by different metrics or classes")
-    return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
+    if one and other and (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
+        refused = refused or "they were scored by different metrics or classes"
+    found = (difference(one, other), over_folds(one, other)) if one and other and not refused else ()
+    return PairwiseComparison(kind, first, second, one, other, refused, *found)
 
 
 def _key(kind: Kind, row: Row) -> Key:
@@ -153,21 +157,21 @@ def _key(kind: Kind, row: Row) -> Key:
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
     """Return one table for each combination of task, metric, protocol, split and hardware; the last has the notes."""
-    groups = grouped(comparisons, _title)
     tables = [
-        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])).compact()
-        for title, pairs in groups.items()
+        text_table(title, COLUMNS, map(_line, pairs), numeric=COLUMNS[1:-1])
+        for title, pairs in grouped(comparisons, _title).items()
     ]
     return [*tables[:-1], *(replace(one, notes=notes_of(comparisons)) for one in tables[-1:])]
 
 
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
-    protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
-    split = [split_name(row["split"])] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
-    data = [visible(row["data"])] if row.get("data") else []
-    return " · ".join([*data, names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
+    protocol = f"{row['protocol']}{' †' if row['dagger'] else ''}" if pair.kind != "protocols" else ""
+    split = split_name(row["split"]) if row["split"] and pair.kind != "splits" else ""
+    data = visible(row.get("data") or "")
+    parts = (data, names, row["task"], metric_name(row), protocol, split, hardware_name(row))
+    return " · ".join(filter(None, parts))
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:
@@ -199,22 +203,15 @@ def _probability(p: float | None) -> str:
 
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     """Return notes that explain the columns and the statistical methods of the tables."""
-    found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
-    if not found:
-        return ()
-    notes = [
-        "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
-        "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all comparisons "
-        "that the matrix declares, others are exploratory. n counts replicates."
-    ]
-    for pair, apart in found:
-        region, unit = pair.row.get("equivalence"), suffix(pair.row["unit"])
-        same = f"scores within {region:g}{unit} count as equal" if region else "no region of equivalence is declared"
-        least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
-        notes.append(f"{pair.row['task']}: {apart.method}; {same}{least}.")
-        if pair.folds:
+    notes = []
+    for pair in comparisons:
+        if pair.difference is not None:
+            region, unit = pair.row["equivalence"], suffix(pair.row["unit"])
+            same = f"; scores within {region:g}{unit} count as equal" if region else ""
+            notes.append(f"{pair.row['task']}: {pair.difference.method}{same}.")
+        if pair.folds is not None:
             notes.append(f"p folds: {pair.folds.method}, for a claim about estimators trained anew.")
-    return tuple(dict.fromkeys(notes))
+    return tuple(dict.fromkeys([_NOTE, *notes])) if notes else ()
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
