@@ -90,8 +90,7 @@ class Table:
         """The provenance in sentences, for tables in files."""
         from tactbench.core.provenance.gather import foot
 
-        made_by = foot(self.provenance) if self.provenance else ()
-        return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
+        return tuple(cut(visible(sentence), LONGEST) for sentence in foot(self.provenance))
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
