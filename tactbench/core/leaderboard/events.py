@@ -17,8 +17,6 @@ _FIGURES = {
     "p95 [ms]": ("onset latency p95 ms", ".0f"),
     "false alarms/min": ("false alarms per minute", ".2g"),
     "slipped [mm]": ("displacement at detection p50 mm", ".2f"),
-    "frames: balanced accuracy": ("frame balanced accuracy", ".2f"),
-    "macro F1": ("frame macro F1", ".2f"),
     "compute [s/s]": ("compute s per s of signal", ".2g"),
 }
 """Key of the figure of merit, and number format, of each column."""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
+from tactbench.core.statistics.paired import Difference, difference, holm
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
@@ -19,7 +19,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "n", "verdict",
+    "of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict",
 )  # fmt: skip
 _NAMES: dict[Kind, Callable[[Row], str]] = {
     "sensors": lambda row: str(row["sensor"]),
@@ -42,8 +42,6 @@ class PairwiseComparison:
     refused: str = ""
     """Reason why the cells are not compared; empty if they are."""
     difference: Difference | None = None
-    folds: FoldDifference | None = None
-    """Difference over folds with overlapping training data; None for a single fold."""
     p_corrected: float | None = None
     """p-value corrected for all comparisons declared in the matrix; None for an exploratory comparison."""
 
@@ -139,7 +137,7 @@ def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | Non
         return PairwiseComparison(kind, first, second, one, other, refused)
     if (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
         return PairwiseComparison(kind, first, second, one, other, "they were scored by different metrics or classes")
-    return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
+    return PairwiseComparison(kind, first, second, one, other, "", difference(one, other))
 
 
 def _key(kind: Kind, row: Row) -> Key:
@@ -185,7 +183,6 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         signed(found.value, unit),
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         _probability(found.p),
-        _probability(pair.folds.p) if pair.folds else ABSENT,
         "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
         f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
         verdict,
@@ -212,23 +209,20 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
         same = f"scores within {region:g}{unit} count as equal" if region else "no region of equivalence is declared"
         least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
         notes.append(f"{pair.row['task']}: {apart.method}; {same}{least}.")
-        if pair.folds:
-            notes.append(f"p folds: {pair.folds.method}, for a claim about estimators trained anew.")
     return tuple(dict.fromkeys(notes))
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
     """Return a comparison as a flat record; all records have the same keys."""
-    row, folds = pair.row, pair.folds
+    row = pair.row
     found: Mapping[str, Any] = {} if pair.difference is None else vars(pair.difference)
     shared = ("task", "rig", "simulated", "protocol", "split", "metric", "unit")
     return {
         "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
-        "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
         "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected,
-        **{key: found.get(key) for key in ("effect", "improved", "verdict", "beyond", "paired", "replicates")},
+        **{key: found.get(key) for key in ("verdict", "paired", "replicates")},
         "method": found.get("method"), "equivalence": row.get("equivalence"), "replicate_unit": found.get("unit"),
         "refused": pair.refused,
     }  # fmt: skip
