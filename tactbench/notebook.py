@@ -242,7 +242,7 @@ class Result(Results):
         from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
 
         if self.row["events"]:
-            raise NotApplicable("No figure is available for events.", hint="See row['operating_points'].")
+            raise NotApplicable("No figure is available for events.", hint="See row['events'].")
         frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
         figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
         for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):

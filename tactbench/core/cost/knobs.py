@@ -92,7 +92,7 @@ def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], proto
     for trees in sorted({*TREES, own}) if isinstance(own, int) else ():
         changed = plain if trees == own else EstimatorChoice(name=first.name, params={"n_estimators": trees})
         yield Setting("trees", str(trees), protocol, changed)
-    if task.answer_per != "frame" and not (task.summaries or task.features_by):
+    if task.answer_per != "frame" and not task.summaries:
         for k in WINDOWS:
             same = first.window_grid == (k,)
             yield Setting("window k", str(k), protocol if same else f"{protocol}@k={k}", plain)

@@ -13,7 +13,6 @@ _FIGURES = {
     "precision": "precision", "recall": "recall", "misses": "misses", "events": "events",
     "latency p50 [ms]": "onset latency p50 ms", "p95 [ms]": "onset latency p95 ms",
     "false alarms/min": "false alarms per minute", "slipped [mm]": "displacement at detection p50 mm",
-    "frames: balanced accuracy": "frame balanced accuracy", "macro F1": "frame macro F1",
     "compute [s/s]": "compute s per s of signal",
 }  # fmt: skip
 """Key of the figure of merit of each column."""

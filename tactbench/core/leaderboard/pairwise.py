@@ -11,7 +11,7 @@ from typing import Any, Literal
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
+from tactbench.core.statistics.paired import Difference, difference, holm
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
@@ -19,7 +19,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite, text_tabl
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "n", "verdict",
+    "of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict",
 )  # fmt: skip
 _NOTE = (
     "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
@@ -47,8 +47,6 @@ class PairwiseComparison:
     refused: str = ""
     """Reason why the cells are not compared; empty if they are."""
     difference: Difference | None = None
-    folds: FoldDifference | None = None
-    """Difference over folds with overlapping training data; None for a single fold."""
     p_corrected: float | None = None
     """p-value corrected for all comparisons declared in the matrix; None for an exploratory comparison."""
 
@@ -142,8 +140,8 @@ def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | Non
             refused = f"{name} {row['status']}: {row['reason']}"
     if one and other and (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
         refused = refused or "they were scored by different metrics or classes"
-    found = (difference(one, other), over_folds(one, other)) if one and other and not refused else ()
-    return PairwiseComparison(kind, first, second, one, other, refused, *found)
+    found = difference(one, other) if one and other and not refused else None
+    return PairwiseComparison(kind, first, second, one, other, refused, found)
 
 
 def _key(kind: Kind, row: Row) -> Key:
@@ -189,7 +187,6 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         signed(found.value, unit),
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         _probability(found.p),
-        _probability(pair.folds.p) if pair.folds else ABSENT,
         "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
         f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
         verdict,
@@ -209,23 +206,20 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
             region, unit = pair.row["equivalence"], suffix(pair.row["unit"])
             same = f"; scores within {region:g}{unit} count as equal" if region else ""
             notes.append(f"{pair.row['task']}: {pair.difference.method}{same}.")
-        if pair.folds is not None:
-            notes.append(f"p folds: {pair.folds.method}, for a claim about estimators trained anew.")
     return tuple(dict.fromkeys([_NOTE, *notes])) if notes else ()
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
     """Return a comparison as a flat record; all records have the same keys."""
-    row, folds = pair.row, pair.folds
+    row = pair.row
     found: Mapping[str, Any] = {} if pair.difference is None else vars(pair.difference)
     shared = ("task", "rig", "simulated", "protocol", "split", "metric", "unit")
     return {
         "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
-        "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
         "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected,
-        **{key: found.get(key) for key in ("effect", "improved", "verdict", "beyond", "paired", "replicates")},
+        **{key: found.get(key) for key in ("verdict", "paired", "replicates")},
         "method": found.get("method"), "equivalence": row.get("equivalence"), "replicate_unit": found.get("unit"),
         "refused": pair.refused,
     }  # fmt: skip

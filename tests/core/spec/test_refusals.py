@@ -55,7 +55,6 @@ FRAMES = {
 }  # fmt: skip
 EVENTS = {**FRAMES, "kind": "events", "metric": "recall_area", "alarms": policy(), "max_false_alarms_per_minute": 1.0}
 PLACE = {"target": VectorTarget(names=("x", "y"), unit="mm"), "metric": "mean_euclidean_error"}
-MAXIMUM = {"target": ChannelTarget(reduce="max")}
 CHANNEL = {"source": "channel", "kind": "force", "name": "fz", "unit": "N"}
 DEPTH = {"source": "label", "name": "depth", "unit": "mm"}
 
@@ -112,23 +111,22 @@ TAKEN_AND_REFUSED = [
     (IndenterDescriptor, {"name": "a", "title": "A", "where": "a:b"}, [{}],
      [{"dimensions": {"angle": Parameter(default=1.0, unit="deg", text="an angle")}}]),
     (TaskSpec, FORCE, [{}], [{"metric": "rsme"}, LABEL | {"target": FORCE["target"]}, {"summaries": (MEAN,)},
-                             {"vote": "frames"}, {"features_by": "a:b"}, MAXIMUM, {"answer_per": "recording"}]),
+                             {"vote": "frames"}, {"answer_per": "recording"}]),
     (TaskSpec, FORCE | PLACE, [{}], [{"kind": "classification"}, {"metric": "rmse"}, {"target": FORCE["target"]}]),
     (TaskSpec, FORCE | FRAMES, [{}],
-     [{"answer_per": "sample"}, {"target": LabelTarget(name="a")}, {"summaries": ()}, {"features_by": "a:b"},
+     [{"answer_per": "sample"}, {"target": LabelTarget(name="a")}, {"summaries": ()},
       {"vote": "frames"}, {"splits": ("in-session",)}, {"alarms": policy(), "max_false_alarms_per_minute": 1.0}]),
     (TaskSpec, FORCE | EVENTS, [{}], [{"alarms": None}, {"max_false_alarms_per_minute": None},
                                       {"target": LabelTarget(name="a"), "answer_per": "sample", "summaries": ()}]),
     (TaskSpec, FORCE | WHOLE,
-     [{"summaries": (MEAN,)}, {"features_by": "a:b"}, {"vote": "frames"},
-      {"kind": "regression", "metric": "rmse", "summaries": (MEAN,), **MAXIMUM},
+     [{"summaries": (MEAN,)}, {"vote": "frames"},
       {"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),), "optional_features": ("ac_pressure",)}],
      [{}, {"summaries": (MEAN,), "vote": "frames"}, {"summaries": (MEAN,), "splits": ("in-session",)},
       {"summaries": (MEAN,), "kind": "regression", "metric": "rmse", "target": ChannelTarget()},
       {"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),)}]),
     (DeclaredTask, {"name": "push", "target": CHANNEL, "splits": ("session",)}, [{}, {"target": DEPTH}],
-     [{"answer": "number"}, {"metric": "macro_f1"}, {"target": DEPTH, "metric": "rmse"}, {"features_by": "os:system"},
-      {"answer_per": "recording", "summaries": [MEAN]}, {"target": {**CHANNEL, "reduce": "max"}}, {"splits": ()}]),
+     [{"answer": "number"}, {"metric": "macro_f1"}, {"target": DEPTH, "metric": "rmse"}, {"frames_by": "os:system"},
+      {"answer_per": "recording", "summaries": [MEAN]}, {"splits": ()}]),
 ]  # fmt: skip
 
 
