@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
-from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.paired import Difference, difference, holm
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
 from tactbench.core.tables.text import visible
@@ -23,8 +21,8 @@ COLUMNS = (
 )  # fmt: skip
 _NOTE = (
     "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
-    "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all comparisons "
-    "that the matrix declares, others are exploratory. n counts replicates."
+    "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all "
+    "pairs of this comparison. n counts replicates."
 )
 _NAMES: dict[Kind, Callable[[Row], str]] = {
     "sensors": lambda row: str(row["sensor"]),
@@ -48,7 +46,7 @@ class PairwiseComparison:
     """Reason why the cells are not compared; empty if they are."""
     difference: Difference | None = None
     p_corrected: float | None = None
-    """p-value corrected for all comparisons declared in the matrix; None for an exploratory comparison."""
+    """p-value corrected for all pairs of cells that were compared at once."""
 
     @property
     def row(self) -> Row:
@@ -59,11 +57,6 @@ class PairwiseComparison:
     def of(self) -> str:
         """Name that both rows share: the estimator of two sensors, the sensor of two estimators, else both names."""
         return str(_key(self.kind, self.row)[-1])
-
-    @property
-    def cells(self) -> frozenset[str]:
-        """Names of the compared cells."""
-        return frozenset(str(row["cell"]) for row in (self.first_row, self.second_row) if row is not None)
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
@@ -105,30 +98,14 @@ def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
     return tasks[task]
 
 
-def with_declared(
-    found: Sequence[PairwiseComparison], rows: Sequence[Row], declared: Iterable[ComparisonChoice]
-) -> list[PairwiseComparison]:
-    """Return comparisons with p-values corrected for all declared comparisons, including those not shown.
-
-    The family of tests consists of all declared pairs of cells in `rows`, the whole leaderboard.
-    """
-    family: dict[frozenset[str], float | None] = {}
-    for choice in declared:
-        pair = choice.sensors or choice.estimators
-        assert pair is not None, "a comparison is of two"
-        with suppress(UnknownNameError):  # the rows have one of them only
-            for one in comparisons(rows, *pair, choice.task):
-                if one.difference is not None and one.kind == ("sensors" if choice.sensors else "estimators"):
-                    family.setdefault(one.cells, one.difference.p)
-    corrected = dict(zip(family, holm(list(family.values())), strict=True))
-    return [replace(pair, p_corrected=corrected.get(pair.cells)) for pair in found]
-
-
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Iterable[Row], second_rows: Iterable[Row]
 ) -> list[PairwiseComparison]:
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
-    return [_pair(kind, first, second, ones.get(key), others.get(key)) for key in dict.fromkeys([*ones, *others])]
+    keys = dict.fromkeys([*ones, *others])
+    pairs = [_pair(kind, first, second, ones.get(key), others.get(key)) for key in keys]
+    corrected = holm([pair.difference.p if pair.difference else None for pair in pairs])
+    return [replace(pair, p_corrected=p) for pair, p in zip(pairs, corrected, strict=True)]
 
 
 def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | None) -> PairwiseComparison:
@@ -187,7 +164,7 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         signed(found.value, unit),
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         _probability(found.p),
-        "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
+        _probability(pair.p_corrected),
         f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
         verdict,
     )
@@ -218,8 +195,7 @@ def record_of(pair: PairwiseComparison) -> dict[str, Any]:
         "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
-        "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected,
-        **{key: found.get(key) for key in ("verdict", "paired", "replicates")},
+        "p_holm": pair.p_corrected, **{key: found.get(key) for key in ("verdict", "paired", "replicates")},
         "method": found.get("method"), "equivalence": row.get("equivalence"), "replicate_unit": found.get("unit"),
         "refused": pair.refused,
     }  # fmt: skip
