@@ -23,7 +23,7 @@ from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.names import grouped
-from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of, with_declared
+from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of
 from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.plan import cell_of
@@ -37,7 +37,6 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
 from tactbench.core.study.results import opened, shown_rows, table_of
-from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
@@ -59,6 +58,7 @@ from tactbench.scoring import (
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
 
@@ -160,7 +160,7 @@ class Results(Rows):
         unknown = UnknownNameError("row", a, ())
         for rows in grouped(self.table.rows, lambda row: row.get("data")).values():
             try:
-                found += with_declared(comparisons(rows, a, b, task), rows, matrix_called().comparisons)
+                found += comparisons(rows, a, b, task)
             except UnknownNameError as error:
                 unknown = error
         if not found:
@@ -231,6 +231,31 @@ class Result(Results):
                 found[name] = labels[values] if len(labels) else values
         frame: pandas.DataFrame = library("pandas").DataFrame(found)
         return frame
+
+    def plot(self) -> Figure:
+        """Return a figure of predictions against true values, one panel for each component, or a confusion matrix.
+
+        Raises NotApplicable for events, whose figure is part of ``tactbench report``.
+        """
+        from matplotlib.figure import Figure
+        from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
+
+        if self.row["events"]:
+            raise NotApplicable("No figure is available for events.", hint="See row['events'].")
+        frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
+        figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
+        for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):
+            part, unit = name.removeprefix("y_true").replace("_", " "), self.row["unit"]
+            drawn = {"y_true": frame[name], "y_pred": frame[name.replace("true", "pred")], "ax": axes}
+            if self.row["confusion"]:
+                more = {"values_format": ".2g", "colorbar": False, "xticks_rotation": "vertical", "cmap": "Blues"}
+                ConfusionMatrixDisplay.from_predictions(**drawn, normalize="true", **more)
+            else:
+                kind, points = "actual_vs_predicted", {"s": 4}
+                PredictionErrorDisplay.from_predictions(**drawn, kind=kind, subsample=None, scatter_kwargs=points)
+                axes.set(xlabel=f"answer{part} [{unit}]", ylabel=f"truth{part} [{unit}]")
+        figure.suptitle(f"{self.row['estimator']}: {self.row['metric']} {self.score:.3g}")
+        return figure
 
 
 def evaluate(

@@ -9,7 +9,7 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, ShuffleSplit
 import tactbench
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.spec.row import DIRECTIONS
-from tests.core.evaluation.made import sessions
+from tests.core.evaluation.made import grasps, label_task, sessions
 
 
 @pytest.fixture(scope="module")
@@ -136,9 +136,15 @@ def test_mistakes_are_named_before_anything_is_computed(data, tmp_path, given, s
     assert not (tmp_path / "out").exists()
 
 
-def test_predictions_have_a_line_for_each_test_row(data):
+def test_answers_are_drawn_over_the_truth_or_as_how_often_each_class_is_taken_for_which(data, tmp_path):
     pytest.importorskip("pandas")
     found = tactbench.evaluate(Ridge(), "force", data["soft"])
+    figure = found.plot()
+    (axes,) = figure.axes
+    assert len(axes.collections[0].get_offsets()) == len(found.predictions)
     assert list(found.predictions) == ["recording", "row", "time_s", "fold", "y_true", "y_pred"]
     assert set(found.predictions["fold"]) == set(found.fold_scores)
-    assert len(found.predictions) == len(found.answers)
+
+    classes = tactbench.evaluate(LogisticRegression(), label_task("kind"), grasps(tmp_path))
+    (axes,) = classes.plot().axes
+    assert axes.images[0].get_array().shape == (2, 2)

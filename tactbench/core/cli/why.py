@@ -52,7 +52,7 @@ def _facts(found: StoredCell) -> dict[str, Any]:
     from tactbench.core.report.cells import recording_scores
 
     row = found.row
-    _, reasons = found.changes()
+    reasons = found.changes()
     done = row["status"] == "done"
     return {
         **row, "cell": found.cell.name, "answer": "hit" if done and not reasons else "miss", "reasons": reasons,
@@ -97,7 +97,7 @@ def _again(found: StoredCell) -> dict[str, Any]:
         "recordings_made": recorded,
         **{name: row[name] for name in ("status", "reason", "traceback", "score")},
         "differences": differences,
-        "circumstances": found.changes()[1],
+        "circumstances": found.changes(),
     }
 
 
