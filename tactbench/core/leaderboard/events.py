@@ -16,13 +16,12 @@ _FIGURES = {
     "latency p50 [ms]": ("onset latency p50 ms", ".0f"),
     "p95 [ms]": ("onset latency p95 ms", ".0f"),
     "false alarms/min": ("false alarms per minute", ".2g"),
-    "slipped [mm]": ("displacement at detection p50 mm", ".2f"),
     "compute [s/s]": ("compute s per s of signal", ".2g"),
 }
 """Key of the figure of merit, and number format, of each column."""
 _NOTE = (
     "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
-    "Slipped: the median displacement from onset to alarm. Compute: computing time per second of signal."
+    "Compute: computing time per second of signal."
 )
 
 

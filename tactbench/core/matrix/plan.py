@@ -138,7 +138,8 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     for cell in cells:
         rules = protocol_called(cell.protocol)
         task = registry.tasks[cell.task].spec
-        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
+        other = cell.baseline and cell.estimator not in task.baselines
+        if rules.first_row_only or cell.split == "in-session" or other:
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
             same = replace(cell, protocol=DEPLOYABLE.name, split=None)
