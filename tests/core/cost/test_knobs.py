@@ -120,10 +120,9 @@ def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, 
     train = made.X[made.folds[0][0]]
     scaled = (rows - train.mean(axis=0)) / train.std(axis=0)
     assert fold.test.X[-1] == pytest.approx(scaled[len(scaled) - k - 1 :].mean(axis=0))
-    parts, remarks = stated_delay_ms(made, registry.estimators["ols"], k)
+    parts, _ = stated_delay_ms(made, registry.estimators["ols"], k)
     assert parts["sampling"] == pytest.approx(10.0 * rules.every)
     assert parts["window"] == pytest.approx(10.0 * rules.every * k / 2)
-    assert not any("sampled at" in one for one in remarks)
 
 
 def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
