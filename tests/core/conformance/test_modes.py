@@ -17,6 +17,7 @@ from tests.conftest import THIRD_PARTY
 from tests.core.conformance.test_recorded import written
 from tests.rigs.parallel_manipulator.spring import EXAMPLE, example
 
+pytestmark = pytest.mark.timeout(600)  # presses take minutes where each line is traced
 QUICK = {
     "sensors__biotac": ...,
     "force__options__rate_hz": 125.0,
