@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
-@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
+@click.option("--live", is_flag=True, help="Show force, planned force and rates while recording.")
 def command(
     sensor: str, rig: str | None, rig_file: str | None, indenter: str | None, profile: str | None, effects: str | None,
     settings: tuple[str, ...], seed: int, out: Path, yes: bool, live: bool,
