@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from tactbench.core.spec.quantity import Quantity, Source
-from tactbench.core.spec.sensor import ChannelKind, PhysicalRange, SensorSpec, Statement
+from tactbench.core.spec.sensor import ChannelKind, DataSheet, PhysicalRange, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
 from tactbench.core.tables.text_table import TextTable
 
 UNKNOWN = "unknown"
 """Text for a property, such as the mass of a device, that no source states."""
-OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
+OF_DEVICES = tuple(name for name in DataSheet.model_fields if name != "exists")
 """Fields of a sensor's data sheet, in the order of the table."""
 
 # Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
@@ -67,7 +67,7 @@ def readings(sensor: SensorSpec) -> Facts:
     delay = f"sampling interval {', '.join(waits) or 'not stated'}; link {link or 'not stated'}"
     found = {
         "streams": Fact("; ".join(streams), _source(sensor.streams[0].rate_source)),
-        "delay of a reading": Fact(delay, _source(link and link.source)),
+        "delay of a reading": Fact(delay, _source(link.source if link else None)),
     }
     for one in sensor.channels("taxel")[:1]:  # they are alike
         limits = "" if one.lower is None or one.upper is None else f"{one.lower:g}–{one.upper:g} "

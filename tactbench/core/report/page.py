@@ -36,7 +36,7 @@ TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 
 def answers_section(results: Results) -> Section:
-    """Return the first section: the outcome of each leaderboard, and how many published scores our intervals contain."""
+    """Return the first section: the outcome of each leaderboard, and the count of published scores in our intervals."""
     verdicts = [
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
         for one in results.leaderboard.blocks

@@ -43,7 +43,7 @@ def confusion(group: Group) -> Sketch:
             ConfusionMatrixDisplay.from_predictions(
                 answers.y_true, answers.y_pred, labels=range(len(names)), display_labels=names, normalize="true",
                 values_format=".0%", include_values=len(names) <= NUMBERS_UP_TO, im_kw={"vmin": 0.0, "vmax": 1.0},
-                cmap="Blues", colorbar=False, ax=here,
+                text_kw={"size": 5.0}, cmap="Blues", colorbar=False, ax=here,
                 xticks_rotation=90 if max(map(len, names)) > 4 and len(names) > 3 else 0.0,
             )  # fmt: skip
             here.set(title=f"{panel.sensor}, {role}", xlabel=with_unit("predicted", group.unit), ylabel="")

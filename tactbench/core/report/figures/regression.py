@@ -78,10 +78,10 @@ def end_to_end(answers: Answers) -> FloatArray:
 def residuals(group: Group) -> Sketch:
     """Draw the test set's predictions against their targets, one panel for each sensor or component of its answers."""
     names = group.task.target.names if isinstance(group.task.target, VectorTarget) else ("",)
-    shown = [
-        (", ".join(filter(None, (panel.sensor, name))), *(one.reshape(len(one), -1)[:, place] for one in both))
+    shown: list[tuple[str, FloatArray, FloatArray]] = [
+        (", ".join(filter(None, (panel.sensor, name))), _column(test.y_true, place), _column(test.y_pred, place))
         for panel in group.panels
-        for both in [(panel.answers["test"].y_true, panel.answers["test"].y_pred)]
+        for test in [panel.answers["test"]]
         for place, name in enumerate(names)
     ]
     columns = min(2, len(shown))
@@ -105,3 +105,8 @@ def residuals(group: Group) -> Sketch:
         "the black line."
     )
     return group.sketch("residuals", f"How far off is the predicted {group.quantity}?", caption, figure)
+
+
+def _column(values: FloatArray, place: int) -> FloatArray:
+    """Return a column of (n, components) values, or all of (n,) values."""
+    return values.reshape(len(values), -1)[:, place]
