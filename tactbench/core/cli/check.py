@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.grid import print_fields, print_records
 from tactbench.core.cli.options import YES, format_option
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from tactbench.core.conformance.check import Subject
-    from tactbench.core.conformance.run import CheckReport
-    from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.conformance.check import CHECKS, KINDS, Mode, Subject
+from tactbench.core.conformance.press import REAL_N
+from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.plugins.rigs import load_rig_file
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.study.operator import TerminalOperator
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import json_text
 
 _FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -40,16 +44,6 @@ def command(
     NAME is that of a component, a mapping file, or a plugin with all its components. Without --rig-file no device
     is opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
-    from tactbench.core.cli.grid import print_fields, print_records
-    from tactbench.core.conformance.check import CHECKS, KINDS, Mode
-    from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
-    from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rigs import load_rig_file
-    from tactbench.core.study.operator import TerminalOperator
-    from tactbench.core.tables.terminal import remark
-    from tactbench.core.tables.text import json_text
-
     if listed:
         checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds), "mode": one.mode,
                    "why": one.why, "do": one.cure} for one in CHECKS]  # fmt: skip
@@ -92,9 +86,6 @@ def command(
 
 def _confirm(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     """Prompt before devices are opened and moved; raises UsageError without a terminal, or for another rig's file."""
-    from tactbench.core.conformance.press import REAL_N
-    from tactbench.core.errors import UsageError
-
     rigs = [one.name for one in subjects if one.kind == "rig"]
     if len(rigs) == len(subjects) == 1:
         file.checked_for(rigs[0])

@@ -7,9 +7,20 @@ from typing import Any
 
 import click
 
+from tactbench.core.cli.cost_twin import show_twin
+from tactbench.core.cli.grid import print_records, print_tables
 from tactbench.core.cli.options import JOBS, RESULTS, format_option, options
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
+from tactbench.core.errors import UsageError
+from tactbench.core.matrix.run import EngineChoice
+from tactbench.core.plugins.declared import declared_in, with_declared
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.figures.trade import trade_table, write_trade
 from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.spec.matrix import REPLICATES
+from tactbench.core.spec.matrix import REPLICATES, MatrixSpec, TaskChoice
+from tactbench.core.study.progress import progress
+from tactbench.core.study.shipped import matrix_called
+from tactbench.core.tables.terminal import remark
 
 
 @click.command(name="cost")
@@ -39,12 +50,9 @@ def command(
     solver (rung) and the tolerance of the simulation. Files are written into the folder cost of the result folder;
     finished cells there are reused.
     """
-    from tactbench.core.errors import UsageError
-
     if twin and task is None:
         if any(options_given.values()):
             raise UsageError("--twin without --task takes --sensor and --rounds only.", hint="Leave the others out.")
-        from tactbench.core.cli.cost_twin import show_twin
 
         show_twin(sensors, out / "cost", shape, rounds)
         return
@@ -61,18 +69,6 @@ def _show_knobs(
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
     """Measure scores and times with varied settings of an estimator or the simulation; print and write the results."""
-    from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.run import EngineChoice
-    from tactbench.core.plugins.declared import declared_in, with_declared
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.figures.trade import trade_table, write_trade
-    from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.shipped import matrix_called
-    from tactbench.core.tables.terminal import remark
-
     registry = with_declared(load_registry(), declared_in(recordings))
     spec = registry.tasks[task].spec
     rig = registry.rigs[registry.first_rig("simulated" if recordings is None else "replays")]

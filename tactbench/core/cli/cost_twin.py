@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from tactbench.core.cost.precision import Skipped
-    from tactbench.core.plugins.interfaces import CostPoint
+from tactbench.core.cli.grid import print_records
+from tactbench.core.cost.precision import Skipped, diagrams, measured, precise
+from tactbench.core.errors import UsageError
+from tactbench.core.files import replace_file, writable
+from tactbench.core.plugins.interfaces import CostPoint, CostStudy
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.report.figures.style import save, styled
+from tactbench.core.report.figures.trade import draw_precision
+from tactbench.core.study.progress import progress
+from tactbench.core.study.shipped import matrix_called
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import json_text
 
 _COLUMNS = (
     "sensor", "observable", "marks", "way", "rung", "seconds", "error_rms", "error_worst", "unit", "noise", "reason",
@@ -25,19 +34,6 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
     rounds
         Number of times that each recording is timed.
     """
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.cost.precision import Skipped, measured
-    from tactbench.core.errors import UsageError
-    from tactbench.core.files import replace_file, writable
-    from tactbench.core.plugins.interfaces import CostStudy
-    from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.report.figures.style import save, styled
-    from tactbench.core.report.figures.trade import draw_precision
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.shipped import matrix_called
-    from tactbench.core.tables.terminal import remark
-    from tactbench.core.tables.text import json_text
-
     registry = load_registry()
     name = registry.first_rig("simulated")
     where = registry.rigs[name].work_precision
@@ -62,8 +58,6 @@ def show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> Non
 
 def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[dict[str, Any]]:
     """Return one flat record for each point, with its time, error and settings, and for each skipped setting."""
-    from tactbench.core.cost.precision import diagrams, precise
-
     found = []
     for group in diagrams(points).values():
         best = precise(group)
