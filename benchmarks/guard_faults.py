@@ -20,6 +20,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tactbench.devices.emulation.real_time import RealTimeDevices
 from tactbench.devices.guard_messages import GuardRefusesError, Report, Trigger
 from tactbench.plugin.devices import (
     Beat,
@@ -153,13 +154,11 @@ class Pressed:
             EmulatorSettings(lambda at_s: dict(zip(AXES, wrench(at_s), strict=True)), rng, options)
         )
         self.force.faults = faults.get("force", [])
-        self.devices = EmulatedDevices(
-            {
-                "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
-                "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
-            },
-            time=setting.time,
-        )
+        devices = {
+            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
+            "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
+        }
+        self.devices = RealTimeDevices(devices) if setting.time == "real" else EmulatedDevices(devices)
         self.clock = self.devices.clock
 
     @property

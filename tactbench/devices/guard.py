@@ -247,7 +247,7 @@ class LocalGuard:
         force, order = Counter(self._force.counts), self._watch.order
         force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
         axes = {name: dict(axis.counts) for name, axis in self._axes.items()}
-        return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
+        return {FORCE: +force, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
         """Retreat, and expect no more beats; this also clears a fault.

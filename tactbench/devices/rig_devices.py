@@ -16,9 +16,9 @@ from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.emulation.emulated_devices import EmulatedDevice
 from tactbench.devices.emulation.line import split_faults
 from tactbench.devices.emulation.scene_samples import PRESSING_FORCE
+from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.devices.emulator import EmulatorSettings, Senses
 from tactbench.links.address import open_link
 from tactbench.links.link import Clock, Link

@@ -22,8 +22,9 @@ from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, RigFile
 from tactbench.core.spec.scene import Scene
-from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulation.real_time import RealTimeDevices
 from tactbench.devices.emulation.scene_samples import SceneSamples
+from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.devices.rig_devices import descriptor_of, emulators_of, options_of
 
 PREPARE_S = 300.0
@@ -94,13 +95,13 @@ def serve(
     emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control,
-        EmulatedDevices(emulators.devices, time="real") as emulated,
+        RealTimeDevices(emulators.devices) as emulated,
     ):
         control.bind(("127.0.0.1", 0))
         control.settimeout(LISTEN_S)
         started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
         while True:
-            emulated.advance(emulated.clock())  # raises the error of an emulator
+            emulated.check()
             try:
                 data, peer = control.recvfrom(65536)
             except TimeoutError:

@@ -15,8 +15,8 @@ from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
 if TYPE_CHECKING:
     from tactbench.devices.control import Control
     from tactbench.devices.driver import Driver, DriverSettings, Options, open_for
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
+    from tactbench.devices.emulation.virtual_time import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulator import (
         DeviceEmulator,
         EmulatorSettings,

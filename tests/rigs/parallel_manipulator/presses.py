@@ -95,7 +95,5 @@ def rig(kind, tmp_path, setting=None, address=None, force_driver=NET_FT, **fault
         made.guard.start()
         yield made
     finally:
-        try:
+        with made.world.devices:
             made.guard.close()
-        finally:
-            made.world.devices.close()
