@@ -29,7 +29,7 @@ class AnyPress(ABC):
 
     def closing_at(self, force_n: float) -> float:
         """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
-        return -np.inf
+        return self.medium.closing_mm(self(force_n).deflection_mm) if self.medium.has_core else -np.inf
 
     def state(
         self, force_n: float, deflection_mm: FloatArray, pressure_mpa: FloatArray,
@@ -99,14 +99,6 @@ class Press(AnyPress):
             force_n, solution.deflection_mm, solution.pressure_mpa,
             solution.depth_mm, solution.residual, self._fluid_pressure(solution),
         )  # fmt: skip
-
-    def closing_at(self, force_n: float) -> float:
-        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
-        if not self.medium.has_core:
-            return -np.inf
-        if force_n <= 0:
-            return self.medium.closing_mm(np.zeros(self.gap_mm.shape))
-        return self.medium.closing_mm(self._solve(force_n).deflection_mm)
 
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:

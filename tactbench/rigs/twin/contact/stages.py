@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ class _Tabulated:
     remarks: Mapping[str, Scalar]
 
 
-_TABLES: dict[bytes, _Tabulated] = {}
+_TABLES: dict[str, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
@@ -133,9 +132,8 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
         f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
         f"|{run.tangential}|{slide_of(run)}"
     )
-    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
-    if key in _TABLES:
-        return _TABLES[key]
+    if text in _TABLES:
+        return _TABLES[text]
     began = time.perf_counter()
     made = _tabulate(run, names, largest, within_reach=not only_skin)
     # Whichever effect needs the table first, its time is that of the contact.
@@ -144,7 +142,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     run.elsewhere_s += spent
     if len(_TABLES) == _MOST_TABLES:
         del _TABLES[next(iter(_TABLES))]
-    _TABLES[key] = made
+    _TABLES[text] = made
     return made
 
 

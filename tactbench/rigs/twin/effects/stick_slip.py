@@ -72,7 +72,7 @@ class Dragged:
             contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
         )
         """(m,) True where sliding is unstable, so that stick-slip occurs."""
-        self._way_mm = drive.speed_mm_s * drive.t_s
+        self._lead_mm = drive.speed_mm_s * drive.t_s - self._static_mm
         self._x_t: list[FloatArray] = []
         self._x_mm: list[FloatArray] = []
         self._phases: list[tuple[float, int, float, float, float]] = []
@@ -152,25 +152,15 @@ class Dragged:
         lead_mm = drive.speed_mm_s * t - x
         if x >= np.interp(t, drive.t_s, self._static_mm):
             return t, x
-        at, size = int(np.searchsorted(drive.t_s, t, side="right")), 8
-        while at < drive.t_s.size:
-            lead = self._way_mm[at : at + size] - self._static_mm[at : at + size]
-            over = lead >= lead_mm
-            first = int(over.argmax())
-            if over[first]:
-                return self._crossing(at + first, lead_mm, t, x, end)
-            if drive.t_s[min(at + size, drive.t_s.size) - 1] >= end:
-                break
-            at, size = at + size, 2 * size
+        at = int(np.searchsorted(drive.t_s, t, side="right"))
+        over = self._lead_mm[at:] >= lead_mm
+        if over.any():
+            node = at + int(over.argmax())
+            low, high = self._lead_mm[node - 1 : node + 1]
+            share = (lead_mm - low) / (high - low) if high > low else 1.0
+            cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
+            end = min(max(float(cross), t), end)
         return end, x + drive.speed_mm_s * (end - t)
-
-    def _crossing(self, node: int, lead_mm: float, t: float, x: float, end: float) -> tuple[float, float]:
-        drive = self.drive
-        low, high = (self._way_mm[n] - self._static_mm[n] for n in (node - 1, node))
-        share = (lead_mm - low) / (high - low) if high > low else 1.0
-        cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
-        cross = min(max(float(cross), t), end)
-        return cross, x + drive.speed_mm_s * (cross - t)
 
     def _slide(self, t: float, x: float, end: float) -> tuple[float, float]:
         """Append a phase of sliding from time t until it is unstable or `end`; return its end time and deflection."""
