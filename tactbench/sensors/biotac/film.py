@@ -65,12 +65,7 @@ def mid_film_mm(
     behind = np.minimum(x, RAYS_FROM_MM)
     ring = np.sqrt(np.maximum(outer_mm**2 - np.maximum(x - dome_mm, 0.0) ** 2, 0.0))
     ray = np.arctan2(x - behind, ring)
-    middle = core_mm(behind, ray, angle_rad) + film_mm / 2
+    middle = core_reach_mm(behind, ray, angle_rad) + film_mm / 2
     height = middle * np.cos(ray)
     around = angle_rad[None, :]
     return np.stack([behind + middle * np.sin(ray), height * np.sin(around), -height * np.cos(around)], axis=-1)
-
-
-def core_mm(from_mm: FloatArray, ray_rad: FloatArray, angle_rad: FloatArray) -> FloatArray:
-    """Return the reach [mm] of the core (:func:`core_reach_mm`) for arrays of places, rays and angles (broadcast)."""
-    return np.asarray(np.frompyfunc(core_reach_mm, 3, 1)(from_mm, ray_rad, angle_rad), dtype=np.float64)

@@ -95,10 +95,12 @@ class Press(AnyPress):
         if force_n <= 0:
             return at_rest(self.medium)
         solution = self._solve(force_n)
-        return self.state(
-            force_n, solution.deflection_mm, solution.pressure_mpa,
-            solution.depth_mm, solution.residual, self._fluid_pressure(solution),
-        )  # fmt: skip
+        deflection, pressure, fluid = solution.deflection_mm, solution.pressure_mpa, 0.0
+        if self.medium.zero_mean and self._wants_fluid_pressure:
+            # The part of the mean contact pressure that the skin itself does not carry.
+            local, _ = self.medium.respond(deflection, np.empty(pressure.shape))
+            fluid = float(np.mean(pressure - local))
+        return self.state(force_n, deflection, pressure, solution.depth_mm, solution.residual, fluid)
 
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:
@@ -143,10 +145,3 @@ class Press(AnyPress):
                     weight *= (force**0.5 - other) / (u[i] - other)
             guess += weight * self._solutions[load].vector
         return guess
-
-    def _fluid_pressure(self, solution: Solution) -> float:
-        """Return the fluid's pressure, the part of the mean contact pressure that the skin itself does not carry."""
-        if not (self.medium.zero_mean and self._wants_fluid_pressure):
-            return 0.0
-        local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))
-        return float(np.mean(solution.pressure_mpa - local))

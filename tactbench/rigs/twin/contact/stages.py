@@ -135,7 +135,18 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     if text in _TABLES:
         return _TABLES[text]
     began = time.perf_counter()
-    made = _tabulate(run, names, largest, within_reach=not only_skin)
+    press, read = pressed(run, names, run.fidelity)
+    tolerances, nodes = _tolerance(run, names), run.fidelity.most_nodes
+    table = build_table(press, read, largest_n=largest, tolerance=tolerances, most_nodes=nodes)
+    slide, sliding = slide_of(run), None
+    if names and slide is not None:
+        from tactbench.rigs.twin.contact.slide_table import build_slide_table
+
+        sliding = build_slide_table(press, read, table, run.skin, *slide)
+    if not only_skin:
+        check_reach(press, largest, run.skin.sheet)
+    remarked = remarks(press, largest, run.skin.sheet)
+    made = _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
     # Whichever effect needs the table first, its time is that of the contact.
     spent = time.perf_counter() - began
     run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
@@ -144,21 +155,6 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
         del _TABLES[next(iter(_TABLES))]
     _TABLES[text] = made
     return made
-
-
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
-    press, read = pressed(run, names, run.fidelity)
-    tolerance, nodes = _tolerance(run, names), run.fidelity.most_nodes
-    table = build_table(press, read, largest_n=largest, tolerance=tolerance, most_nodes=nodes)
-    slide, sliding = slide_of(run), None
-    if names and slide is not None:
-        from tactbench.rigs.twin.contact.slide_table import build_slide_table
-
-        sliding = build_slide_table(press, read, table, run.skin, *slide)
-    if within_reach:
-        check_reach(press, largest, run.skin.sheet)
-    remarked = remarks(press, largest, run.skin.sheet)
-    return _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])

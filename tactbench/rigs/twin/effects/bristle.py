@@ -6,8 +6,6 @@ exponentially with the distance travelled: ``z' = b z + (1 - b) g sign(v)``, ``b
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from tactbench.plugin import FloatArray
@@ -19,51 +17,37 @@ NOTHING_MM = 1e-12
 """Deflection, a femtometre, below which a deflection counts as zero."""
 
 
-def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s: float) -> float:
-    """Return the friction coefficient at a speed: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
+def coefficient(speed_mm_s: FloatArray, static: float, kinetic: float, stribeck_mm_s: float) -> FloatArray:
+    """Return (n,) friction coefficients at (n,) speeds: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
 
     The coefficient falls fastest at rest, so that the slowest slide is the least stable. For ``v_s`` below a nanometre
     per second it has two values only, static and kinetic (Coulomb).
     """
     if stribeck_mm_s < COULOMB_MM_S:
-        return kinetic if speed_mm_s else static
-    return kinetic + (static - kinetic) * math.exp(-abs(speed_mm_s) / stribeck_mm_s)
+        return np.where(speed_mm_s == 0, static, kinetic)
+    return np.asarray(kinetic + (static - kinetic) * np.exp(-np.abs(speed_mm_s) / stribeck_mm_s))
 
 
-def bristle(t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float) -> FloatArray:
+def bristle(
+    t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float, most_mm: FloatArray | None = None
+) -> FloatArray:
     """Return the (n,) deflection of the bristle at (n,) ascending times and a constant speed, from `start_mm` on.
 
     At a speed of 0, and between equal times, the deflection stays. `limit_mm` (n,) is the deflection ``g`` of steady
-    sliding, at least 0 and constant from each sample to the next; where it is 0, motion leaves no deflection.
+    sliding, at least 0 and constant from each sample to the next; where it is 0, motion leaves no deflection. With
+    `most_mm` (n,), the deflection is at most this at every sample; samples are computed one after the other only if
+    this limit is reached, which is rare.
     """
     way = abs(speed_mm_s) * np.diff(t_s, prepend=t_s[:1])
     held = np.concatenate([limit_mm[:1], limit_mm[:-1]])
     lost = -np.expm1(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > NOTHING_MM))
     drive = lost * held * np.sign(speed_mm_s)
     drive[0] = start_mm
-    return recurrence(1.0 - lost, drive)
-
-
-def bristle_below(
-    t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float, most_mm: FloatArray
-) -> FloatArray:
-    """Return the deflection of :func:`bristle`, limited at every sample to at most `most_mm` (n,).
-
-    The samples are computed one after the other only if the limit is reached, which is rare.
-    """
-    free = bristle(t_s, speed_mm_s, limit_mm, start_mm)
-    over = free > most_mm
-    if not over.any():
-        return free
-    first = int(over.argmax())
-    way = abs(speed_mm_s) * np.diff(t_s)
-    held = limit_mm[:-1]
-    kept = np.exp(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > NOTHING_MM))
-    fresh = (1.0 - kept) * held * np.sign(speed_mm_s)
-    x = float(most_mm[first])
-    free[first] = x
-    steps = zip(kept[first:].tolist(), fresh[first:].tolist(), most_mm[first + 1 :].tolist(), strict=True)
-    for sample, (b, more, most) in enumerate(steps, first + 1):
-        x = min(b * x + more, most)
-        free[sample] = x
-    return free
+    found: FloatArray = recurrence(1.0 - lost, drive)
+    if most_mm is not None and (found > most_mm).any():
+        first = int((found > most_mm).argmax())
+        found[first] = most_mm[first]
+        for sample in range(first + 1, found.size):
+            free = (1.0 - lost[sample]) * found[sample - 1] + drive[sample]
+            found[sample] = min(free, most_mm[sample])
+    return found

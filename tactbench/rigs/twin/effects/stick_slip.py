@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
-from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle_below, coefficient
+from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle, coefficient
 from tactbench.rigs.twin.effects.skin_mode import Mode, deflection_after, is_caught, slip_s, swing
 from tactbench.rigs.twin.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.synthesis import Tangential
@@ -64,9 +64,12 @@ class Dragged:
         self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
         """(m,) deflection at which a slip begins while the surface moves."""
         self._release_mm = drive.static * drive.load_n * per_n
-        self._kinetic = self._within_slip(per_n)
+        # Friction during a slip: at the mean speed of an undamped one.
+        u = (drive.static - drive.kinetic) * drive.load_n * per_n
+        mean_mm_s = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
+        self._kinetic = coefficient(mean_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
         self._kinetic_mm = self._kinetic * drive.load_n * per_n
-        steady = coefficient(drive.speed_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
+        steady = coefficient(np.array(drive.speed_mm_s), drive.static, drive.kinetic, drive.stribeck_mm_s)
         self._steady_mm = steady * drive.load_n * per_n
         self._breaks = (
             contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
@@ -88,21 +91,6 @@ class Dragged:
     def let_go_s(self) -> FloatArray:
         """(k,) times at which the skin began to slip."""
         return np.asarray(self._begin[self._kind == SLIP])
-
-    @property
-    def caught_s(self) -> FloatArray:
-        """(k,) times at which the skin began to stick."""
-        return np.asarray(self._begin[self._kind == STICK])
-
-    def _within_slip(self, per_n: FloatArray) -> FloatArray:
-        """Return the (m,) friction coefficients during a slip: those at the mean speed of an undamped slip."""
-        drive = self.drive
-        if drive.stribeck_mm_s < COULOMB_MM_S:
-            return np.full(drive.t_s.size, drive.kinetic)
-        u = (drive.static - drive.kinetic) * drive.load_n * per_n
-        mean = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
-        weaker = np.exp(-mean / drive.stribeck_mm_s)
-        return np.asarray(drive.kinetic + (drive.static - drive.kinetic) * weaker)
 
     def _unstable(self) -> npt.NDArray[np.bool_]:
         """Return (m,) True where friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
@@ -174,7 +162,7 @@ class Dragged:
         limit = np.interp(knots, drive.t_s, self._steady_mm)
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
-        deflection = bristle_below(knots, drive.speed_mm_s, limit, x, most)
+        deflection = bristle(knots, drive.speed_mm_s, limit, x, most)
         self._add(t, SLIDE, x)
         self._x_t.append(knots)
         self._x_mm.append(deflection)
