@@ -13,10 +13,8 @@ from tactbench.core.leaderboard.pairwise import (
     folder_comparisons,
     record_of,
     tables_of,
-    with_declared,
 )
 from tactbench.core.study.results import is_results, opened, shown_rows
-from tactbench.core.study.shipped import matrix_called
 
 
 @click.command(name="compare")
@@ -24,9 +22,8 @@ from tactbench.core.study.shipped import matrix_called
 @click.argument("second", metavar="B")
 @RESULTS
 @click.option("--task", metavar="NAME", help="Compare results of this task only.")
-@click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
 @format_option("table", "json", "md", "latex", "csv")
-def command(first: str, second: str, out: Path, task: str | None, config: str | None, shape: str) -> None:
+def command(first: str, second: str, out: Path, task: str | None, shape: str) -> None:
     """Compare A and B replicate by replicate: two sensors, estimators, protocols, splits, or result folders.
 
     With two folders, cells of the same name are compared: before and after a change, or of two laboratories.
@@ -35,9 +32,7 @@ def command(first: str, second: str, out: Path, task: str | None, config: str | 
         before, after = (shown_rows(opened(Path(one))) for one in (first, second))
         found = folder_comparisons(before, after, first, second, task)
     else:
-        matrix = matrix_called(config)
-        rows = shown_rows(opened(out))
-        found = with_declared(comparisons(rows, first, second, task), rows, matrix.comparisons)
+        found = comparisons(shown_rows(opened(out)), first, second, task)
     if shape in ("json", "csv"):
         print_records(list(map(record_of, found)), shape)
     else:

@@ -50,7 +50,7 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
 def _facts(found: StoredCell) -> dict[str, Any]:
     """Return the row of the first replicate, with the reasons, if any, why a run would not reuse the result."""
     row = found.row
-    _, reasons = found.changes()
+    reasons = found.changes()
     done = row["status"] == "done"
     return {
         **row, "cell": found.cell.name, "answer": "hit" if done and not reasons else "miss", "reasons": reasons,
@@ -89,7 +89,7 @@ def _again(found: StoredCell) -> dict[str, Any]:
         "recordings_made": recorded,
         **{name: row[name] for name in ("status", "reason", "traceback", "score")},
         "differences": differences,
-        "circumstances": found.changes()[1],
+        "circumstances": found.changes(),
     }
 
 

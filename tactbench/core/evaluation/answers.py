@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ class Configured:
 
 @dataclass(frozen=True)
 class FittedFold:
-    """A model and the fold to whose training set it was fitted, with the time [s] of search and fit."""
+    """A model and the fold to whose training set it was fitted."""
 
     fold: Fold
     model: Estimator
@@ -50,13 +50,13 @@ class FittedFold:
     """Parameters chosen on validation data; None if there was nothing to choose."""
     k: int
     """Number of earlier rows that the mean filter includes beside the current one."""
-    search_s: float
-    fit_s: float
+    spent: Mapping[str, float]
+    """Computing times [s] of search and fit, by their names in :class:`Cost`."""
 
 
 @dataclass(frozen=True)
 class AnsweredFold:
-    """Answers of a model to the sets of one fold, the scores of these answers, and the computing time [s]."""
+    """Answers of a model to the sets of one fold, the scores of these answers, and the computing times."""
 
     name: str
     choice: Choice | None
@@ -67,13 +67,11 @@ class AnsweredFold:
     """Numbers of training rows and of test answers: rows, recordings, or events plus one for each test recording."""
     untrained: tuple[Any, ...]
     """Classes of test rows that no training row has."""
-    search_s: float
-    fit_s: float
-    predict_s: float
-    batch_rows: int
+    spent: Mapping[str, float]
+    """Computing times [s], and number of rows in the timed prediction, by their names in :class:`Cost`."""
     sets: Mapping[Role, Answers]
     detected: Sequence[Scored] = ()
-    """Scored test recordings of an event detection task, each with the fold's thresholds; else empty."""
+    """Scored test recordings of an event detection task, each with the fold's threshold; else empty."""
 
 
 def fitted_fold(
@@ -108,7 +106,7 @@ def fitted_fold(
     model = estimator.build(choice.params if choice else {})
     began = clock()
     fit(model, X, fold.train.y, descriptor.name, counts, **more)
-    return FittedFold(fold, model, choice, k, search_s, clock() - began)
+    return FittedFold(fold, model, choice, k, {"search_s": search_s, "fit_s": clock() - began})
 
 
 def answered_fold(
@@ -138,8 +136,8 @@ def answered_fold(
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
         curves = {role: rules.curve(several) for role, several in scored.items()}
-        thresholds = rules.choose(curves.get("validation"))
-        detected = [one._replace(thresholds=thresholds) for one in scored["test"]]
+        threshold = rules.choose(curves.get("validation"))
+        detected = [replace(one, threshold=threshold) for one in scored["test"]]
         sets = {
             role: rules.items(several, curves[role], made, number)
             for role, several in scored.items()
@@ -154,10 +152,7 @@ def answered_fold(
         validation=fitted.choice.score if fitted.choice else scores.get("validation"),
         sizes=(len(fold.train), len(sets["test"])),
         untrained=tuple(made.classes[int(one)] for one in untrained),
-        search_s=fitted.search_s,
-        fit_s=fitted.fit_s,
-        predict_s=predict_s,
-        batch_rows=len(fold.test),
+        spent={**fitted.spent, "predict_s": predict_s, "batch_rows": len(fold.test)},
         sets=sets if single else {"test": sets["test"]},
         detected=detected,
     )

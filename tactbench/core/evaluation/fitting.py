@@ -7,7 +7,7 @@ import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -182,13 +182,11 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
 
 @dataclass(frozen=True)
 class Choice:
-    """Parameters and mean filter (over `k` + 1 rows) that were tried, and their score on validation data."""
+    """Parameters and mean filter (over `k` + 1 rows) that were chosen, and their score on validation data."""
 
     params: dict[str, Any]
     k: int
     score: float
-    compared: tuple[Choice, ...] = ()
-    """All choices in the order of trial, including this one; empty unless this choice was selected."""
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
@@ -257,5 +255,4 @@ def select(
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
             tried.append(Choice(params, k, score))
     best_of = min if lower_is_better(metric.name) else max
-    best = best_of(tried, key=lambda candidate: candidate.score)  # of equals the first
-    return replace(best, compared=tuple(tried))
+    return best_of(tried, key=lambda candidate: candidate.score)  # of equals the first

@@ -34,7 +34,7 @@ Features = Mapping[str, float]
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
     """Return True if each recording is reduced to one row of summaries, and not to its first row by the protocol."""
-    return task.answer_per == "recording" and bool(task.summaries or task.features_by) and not rules.first_row_only
+    return task.answer_per == "recording" and bool(task.summaries) and not rules.first_row_only
 
 
 def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
@@ -52,16 +52,8 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
         )
     compute = recording_features(task, rules)
     rows = [compute(table) for table in data.tables]
-    names = tuple(rows[0])
-    for table, row in zip(data.tables, rows, strict=True):
-        if tuple(row) != names:
-            raise PluginContractError(
-                f"{task.features_by} gave other features for recording {table.meta.name!r} than for "
-                f"{data.tables[0].meta.name!r}.",
-                hint="The function must return the same names of features in the same order for every recording.",
-            )
     tables = tuple(_one_row(table, row) for table, row in zip(data.tables, rows, strict=True))
-    return replace(data, tables=tables, features=names)
+    return replace(data, tables=tables, features=tuple(rows[0]))
 
 
 def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: ProtocolSpec) -> EstimatorDescriptor:
@@ -69,14 +61,12 @@ def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: Protocol
 
     The only length is 0 if the task has summaries, or that of the protocol if stated; else the estimator's own apply.
     """
-    one = bool(task.summaries or task.features_by)
-    windows = (0,) if one else estimator.window_grid if rules.k is None else (rules.k,)
+    windows = (0,) if task.summaries else estimator.window_grid if rules.k is None else (rules.k,)
     return estimator.model_copy(update={"window_grid": windows})
 
 
 def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table], Features]:
-    """Return the function that computes the features of one recording, and import the task's own code for that."""
-    own = load_object(task.features_by) if task.features_by else None
+    """Return the function that computes the features of one recording."""
 
     def compute(table: Table) -> Features:
         streams = kept(table, rules)
@@ -88,14 +78,6 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
                     values = summary_of(stream, summary, table.meta.name)[columns]
                     names = [f"{stream.channels[place]} {summary.name}" for place in columns]
                     found |= dict(zip(names, values.tolist(), strict=True))
-        if own is not None:
-            more = own(streams)
-            if not more or not all(np.isfinite(value) for value in more.values()):
-                raise PluginContractError(
-                    f"{task.features_by} gave no or not only finite numbers for recording {table.meta.name!r}.",
-                    hint="Given a tuple of StreamReadings, it must return a mapping of names to finite numbers.",
-                )
-            found |= {name: float(value) for name, value in more.items()}
         for name, value in found.items():
             require_computable(np.array(value), name, table.meta)
         return found

@@ -64,8 +64,6 @@ class ChannelTarget(Frozen):
     """Name of the channel, if a recording has several of this kind; None: the only channel, or the channel named
     `normal`."""
     unit: str = "N"
-    reduce: Literal["mean", "max"] | None = None
-    """Reduction of a recording's samples of the target to one number, for `answer_per: recording`."""
 
 
 VECTOR_METRIC: Final = "mean_euclidean_error"
@@ -184,16 +182,13 @@ class TaskSpec(TaskFields):
     """Kind of answer. For `events`, it is a time of onset: detectors score frames, and `alarms` makes alarms."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
-    """Unit of an answer. `recording`: one class or number for each recording, by `summaries` and `features_by` or by
-    `vote`; its label is constant within a recording. `frame`: one answer for each window of the target's length."""
+    """Unit of an answer. `recording`: one class or number for each recording, by `summaries` or by `vote`;
+    its label is constant within a recording. `frame`: one answer for each window of the target's length."""
     alarms: AlarmPolicy | None = None
     """Rules by which scores of frames become alarms, for events."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
     """Largest rate of false alarms on validation recordings [1/min], subject to which the threshold with the largest
     recall is chosen."""
-    features_by: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable`` for features of the task's own beside `summaries`, called with a recording as a tuple of
-    :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording."""
     metric: str
     """Name of the primary metric; docs/glossary.md describes the metrics."""
     unit: str = "1"
@@ -242,8 +237,8 @@ class TaskSpec(TaskFields):
         framed = isinstance(self.target, SlipTarget)
         if framed != (self.answer_per == "frame"):
             raise ValueError("answer_per: frame and a target of frames require each other")
-        if framed and (not self.summaries or self.features_by or self.vote):
-            raise ValueError("answer_per: frame needs summaries, and neither features_by nor vote")
+        if framed and (not self.summaries or self.vote):
+            raise ValueError("answer_per: frame needs summaries and no vote")
         if framed and "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time, and a frame would extend across a cut")
         if (self.kind == "events") != (self.alarms is not None and self.max_false_alarms_per_minute is not None):
@@ -256,16 +251,14 @@ class TaskSpec(TaskFields):
     def _recordings_are_answered_in_one_way(self) -> TaskSpec:
         if self.answer_per == "frame":
             return self
-        summarised = bool(self.summaries or self.features_by)
-        reduced = isinstance(self.target, ChannelTarget) and self.target.reduce is not None
         if self.answer_per == "sample":
-            if summarised or self.vote or reduced:
-                raise ValueError("summaries, features_by, vote and a channel's reduce need answer_per: recording")
+            if self.summaries or self.vote:
+                raise ValueError("summaries and vote need answer_per: recording")
             return self
-        if summarised == bool(self.vote):
-            raise ValueError("answer_per: recording needs either summaries or features_by, or else vote: frames")
-        if not isinstance(self.target, LabelTarget) and not reduced:
-            raise ValueError("answer_per: recording needs a label, or a channel with `reduce`")
+        if bool(self.summaries) == bool(self.vote):
+            raise ValueError("answer_per: recording needs either summaries or vote: frames")
+        if not isinstance(self.target, LabelTarget):
+            raise ValueError("answer_per: recording needs a label")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording does not allow cuts")
         if unseen := {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at):
@@ -289,8 +282,7 @@ class TaskSpec(TaskFields):
             return str(self.target)
         if self.vote:
             return f"the {'commonest' if self.kind == 'classification' else 'mean'} answer of its frames"
-        own = [f"features by {self.features_by}"] if self.features_by else []
-        return ", ".join([one.name for one in self.summaries] + own)
+        return ", ".join(one.name for one in self.summaries)
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
         """Return the published figure comparable with a result, preferably of this sensor; None: there is none."""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import Setting, measure, quick_estimator, settings_of
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of
 from tactbench.core.cost.precision import precise
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
@@ -19,7 +19,7 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.figures.trade import draw_precision, draw_trade
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS
@@ -137,13 +137,6 @@ def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, regis
 
 def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
     assert quick_estimator(registry, "force") == "ols"
-
-
-def test_a_setting_is_of_its_own_row_only():
-    row = {"cell": "s/force/replay/deployable:few-shot-1/ols/1", "estimator": "ols", "params": {}}
-    ols = EstimatorChoice(name="ols")
-    assert Setting("k", "1", "deployable", ols, "few-shot-1").is_of(row)
-    assert not Setting("k", "1", "deployable", ols).is_of(row)
 
 
 def cost_point(seconds, error, *, subject="pad"):

@@ -65,7 +65,7 @@ def test_as_many_pairs_as_mir_eval_on_ten_thousand_random_cases():
 
 
 def test_of_two_alarms_on_one_event_the_first_is_the_hit():
-    events, hits = match(np.array([100 * MS]), np.array([160 * MS, 120 * MS]), policy())
+    events, hits = match(np.array([100 * MS]), np.array([10, 120, 160]) * MS, policy())
     assert (events.tolist(), hits.tolist()) == ([0], [1])
 
 

@@ -10,7 +10,7 @@ from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec import force_profiles
 from tactbench.core.spec.declared_task import DeclaredTask
-from tactbench.core.spec.events import THRESHOLDS, SlipTarget, nanoseconds
+from tactbench.core.spec.events import SlipTarget, nanoseconds
 from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 from tactbench.core.spec.quantity import assumed, derived, measured, sourced
 from tactbench.core.spec.rig import Parameter
@@ -71,8 +71,7 @@ def from_frames(**more):
         (force_task(**LABEL, **VOTE).answer_from, "the commonest answer of its frames"),
         (force_task(**LABEL | {"kind": "regression", "metric": "rmse"}, **VOTE).answer_from,
          "the mean answer of its frames"),
-        (force_task(**LABEL, answer_per="recording", splits=(), summaries=MEAN, features_by="a:b").answer_from,
-         "mean, features by a:b"),
+        (force_task(**LABEL, answer_per="recording", splits=(), summaries=MEAN).answer_from, "mean"),
         (from_frames(splits=()).answer_from, str(FRAMES)),
         (plural("session"), "sessions"),
         (plural("press"), "presses"),
@@ -102,11 +101,6 @@ def test_quantities_have_the_tag_of_their_maker_and_times_are_whole_nanoseconds(
     assert [one(1.5, "mm", "why").source.tag for one in made] == [one.__name__ for one in made]
     assert sourced(1.5, "mm", "why") == sourced(1.5, "mm", "why").model_copy(update={"value": 1.5})
     assert (nanoseconds(5.0), nanoseconds(1.4e-9)) == (5_000_000_000, 1)
-
-
-def test_thresholds_are_scaled_where_labels_part_and_not_where_they_exist():
-    expected = {"gross_displacement_m": 2e-4, "incipient_slip_share": 0.2, "gross_stick_ratio": 0.2}
-    assert THRESHOLDS.scaled(2).model_dump() == pytest.approx({"hold_s": 0.1, "contact_force_n": 0.05, **expected})
 
 
 def test_named_profiles_without_parameters():
