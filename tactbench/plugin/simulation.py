@@ -4,9 +4,6 @@ Skins, nuisances, transducers and skin states; effects, comparisons with exact s
 """
 
 from tactbench.core.plugins.interfaces import (
-    CostJob,
-    CostPoint,
-    CostStudy,
     EffectRun,
     EffectTrack,
     Explained,
@@ -25,9 +22,6 @@ from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPa
 
 __all__ = [
     "BondedLayer",
-    "CostJob",
-    "CostPoint",
-    "CostStudy",
     "Creep",
     "Dome",
     "EffectDescriptor",

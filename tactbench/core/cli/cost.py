@@ -7,72 +7,53 @@ from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import print_records, print_tables
 from tactbench.core.cli.options import JOBS, RESULTS, format_option, options
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
+from tactbench.core.errors import UsageError
+from tactbench.core.matrix.run import EngineChoice
+from tactbench.core.plugins.declared import declared_in, with_declared
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.figures.trade import trade_table, write_trade
 from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.spec.matrix import REPLICATES
+from tactbench.core.spec.matrix import REPLICATES, MatrixSpec, TaskChoice
+from tactbench.core.study.progress import progress
+from tactbench.core.study.shipped import matrix_called
+from tactbench.core.tables.terminal import remark
 
 
 @click.command(name="cost")
 @options(
-    click.option("--twin", is_flag=True,
-                 help="Measure the simulated rig instead: score against seconds, or without --task its error."),
+    click.option("--twin", is_flag=True, help="Vary the solver and tolerance of the simulated rig instead."),
     click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; with --twin repeatable."),
-    click.option("--task", metavar="NAME", help="Task."),
+    click.option("--task", metavar="NAME", help="Task. Default with --twin: the first of benchmarks.yaml."),
     click.option("--estimator", "estimators", multiple=True, metavar="NAME",
                  help="Estimator; repeatable: the first is varied. Default: the task's first; --twin: a quick one."),
     click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay."),
     click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
                  help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
-    click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
-                 help="Number of timing rounds, for --twin without --task."),
     JOBS,
     RESULTS,
 )  # fmt: skip
 @format_option("table", "json", "csv")
 def command(
-    twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **options_given: Any
-) -> None:
+    twin: bool, sensors: tuple[str, ...], task: str | None, estimators: tuple[str, ...], recordings: Path | None,
+    protocol: str | None, repeats: int | None, jobs: int | None, out: Path, shape: str,
+) -> None:  # fmt: skip
     """Measure scores against times for varied settings, and draw the figure.
 
     One setting after another is varied: trees, window, sampling rate, training sessions, estimators; with --twin the
     solver (rung) and the tolerance of the simulation. Files are written into the folder cost of the result folder;
     finished cells there are reused.
     """
-    from tactbench.core.errors import UsageError
-
-    if twin and task is None:
-        if any(options_given.values()):
-            raise UsageError("--twin without --task takes --sensor and --rounds only.", hint="Leave the others out.")
-        from tactbench.core.cli.cost_twin import show_twin
-
-        show_twin(sensors, out / "cost", shape, rounds)
-        return
-    if task is None or (len(sensors) != 1 and not twin):
+    if not twin and (task is None or len(sensors) != 1):
         raise UsageError(
             "One sensor and one task are expected, or --twin.",
             hint="For estimators, give --sensor NAME --task NAME, each once; for the simulated rig, give --twin.",
         )
-    _show_knobs(sensors, task, twin, out / "cost", shape, **options_given)
-
-
-def _show_knobs(
-    sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
-    recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
-) -> None:  # fmt: skip
-    """Measure scores and times with varied settings of an estimator or the simulation; print and write the results."""
-    from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.run import EngineChoice
-    from tactbench.core.plugins.declared import declared_in, with_declared
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.figures.trade import trade_table, write_trade
-    from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.shipped import matrix_called
-    from tactbench.core.tables.terminal import remark
-
+    task = task or matrix_called().tasks[0].name
+    folder = out / "cost"
     registry = with_declared(load_registry(), declared_in(recordings))
     spec = registry.tasks[task].spec
     rig = registry.rigs[registry.first_rig("simulated" if recordings is None else "replays")]
