@@ -1,20 +1,24 @@
-"""Figure and table of accuracy against time: settings varied by `tactbench cost`."""
+"""Figures and tables of accuracy against time: settings varied by `tactbench cost`, errors of a simulated rig."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cost.knobs import TIMES
+from tactbench.core.cost.precision import SHARE, diagrams
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
-from tactbench.core.report.figures.style import GREY, LINES, MARKERS, PAGE_IN, legend, panels, save, styled
+from tactbench.core.plugins.interfaces import CostPoint
+from tactbench.core.report.figures.style import BLACK, GREY, LINES, MARKERS, PAGE_IN, legend, panels, save, styled
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ACROSS = {
@@ -37,20 +41,15 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
             place = list(TIMES).index(knob)
             line = "" if knob == "estimator" else "-"
-            style: dict[str, Any] = {"color": LINES[place % len(LINES)], "linewidth": 0.6}
-            across, upwards = [one[time] for one in path], [one["score"] for one in path]
-            here.plot(across, upwards, MARKERS[place] + line, markersize=4, label=knob, **style)
+            texts = [str(one["value"]) for one in path]
+            _path(here, [one[time] for one in path], [one["score"] for one in path], texts, place, knob, line=line)
             for one in path:
-                here.annotate(visible(str(one["value"])), (one[time], one["score"]), (3, 3), fontsize=5.5,
-                              textcoords="offset points", color=style["color"])  # fmt: skip
                 if one["ci_low"] is not None and one["ci_high"] is not None:
-                    here.vlines(one[time], one["ci_low"], one["ci_high"], **style)
+                    here.vlines(one[time], one["ci_low"], one["ci_high"], LINES[place % len(LINES)], linewidth=0.6)
         if known["trivial"] is not None:
             here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
-        # 1, 2, 5, 10 … instead of powers of ten.
-        here.xaxis.set_major_formatter("{x:g}")
-        here.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
+        _plain_numbers(here.xaxis)
     axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
@@ -63,6 +62,46 @@ def title_of(known: Mapping[str, Any]) -> str:
     several = f"{known['replicates']} replicates" if known["replicates"] > 1 else "one replicate"
     bars = ", bars: 95 %" if any(one["ci_low"] is not None for one in known["settings"]) else ""
     return f"{known['sensor']}, {known['task']} · {known['protocol']}{simulated} · {several}{bars}"
+
+
+def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
+    """Return the figure of a simulated rig: error against seconds per recording, one panel for each observable.
+
+    The dashed line is a third of the observable's noise.
+    """
+    found = diagrams(points)
+    figure, axes = panels(-(-len(found) // 2), min(2, len(found)), 3.0, width_in=PAGE_IN)
+    for here in axes.flat[len(found) :]:
+        here.set_visible(False)
+    for here, ((subject, observable), group) in zip(axes.flat, found.items(), strict=False):
+        errors = [max(one.error, 1e-12) for one in group]  # a logarithmic axis cannot show 0
+        _path(here, [one.seconds for one in group], errors, [one.label for one in group], 0, "settings", line="")
+        if math.isfinite(group[0].floor):
+            here.axhline(SHARE * group[0].floor, color=BLACK, ls="--", lw=0.8, label="a third of the noise")
+        here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
+                 ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
+        _plain_numbers(here.xaxis)
+        _plain_numbers(here.yaxis)
+    figure.suptitle(title)
+    legend(figure, axes.flat)
+    return figure
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers of ten."""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
+
+
+def _path(
+    here: Axes, across: Sequence[float], upwards: Sequence[float], texts: Sequence[str], place: int, name: str, *,
+    line: str,
+) -> None:  # fmt: skip
+    """Draw points with one text each, joined by a line of the style `line`; `place` selects colour and marker."""
+    colour = LINES[place % len(LINES)]
+    here.plot(across, upwards, MARKERS[place] + line, color=colour, markersize=4, linewidth=1.0, label=name)
+    for text, x, y in zip(texts, across, upwards, strict=True):
+        here.annotate(visible(text), (x, y), (3, 3), textcoords="offset points", color=colour, fontsize=5.5)
 
 
 _COLUMNS = {
