@@ -21,14 +21,17 @@ _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
 @click.command(name="inspect")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @format_option("table", "json")
+@click.option("--salvage", is_flag=True, help="Show an unfinished FILE (….partial), also while it grows.")
 @click.option("--rescue", type=click.Path(path_type=Path), metavar="OUT",
               help="Convert one FILE that is unfinished (….partial) into the recording OUT.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, files: tuple[Path, ...], shape: str, rescue: Path | None) -> None:
+def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool, rescue: Path | None) -> None:
     """Show the contents of recordings (streams, channels, rates), and check their health.
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
+    from tempfile import TemporaryDirectory
+
     from tactbench.core.recording.partial import rescue as convert
     from tactbench.core.recording.reader import open_recording
 
@@ -39,8 +42,12 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, rescue: Pat
         files = (rescue,)
     described = []
     for path in files:
-        with open_recording(path) as recording:
-            described.append(describe(recording))
+        with TemporaryDirectory() as folder:
+            shown = Path(folder) / "salvaged.h5" if salvage and rescue is None else path
+            if shown != path:
+                convert(path, shown)
+            with open_recording(shown) as recording:
+                described.append({**describe(recording), "file": str(path)})
         if shape == "table":
             _print(described[-1])
     if shape == "json":
@@ -58,7 +65,7 @@ def describe(recording: Recording) -> dict[str, Any]:
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     return {
-        "file": str(recording.path), "content_sha256": recording.verify(),
+        "content_sha256": recording.verify(),
         "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}), "sensor": meta.sensor.name,
         "streams": [{"of": "sensor" if name in own else "reference", **_stream(recording, name)}
                     for name in recording.stream_names],

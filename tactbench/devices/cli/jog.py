@@ -15,7 +15,7 @@ from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, RigFile
 from tactbench.core.tables.terminal import remark
 from tactbench.devices.driver import Driver
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Limits
 from tactbench.devices.positioner import Positioner

@@ -100,6 +100,7 @@ def test_what_a_crash_left_behind(tables):
         writer.append(Block("scale", np.arange(9), np.ones((9, 1))))
         shutil.copy(tables.folder / "new.h5.partial", tables.folder / "left.h5.partial")
     assert "--rescue" in tables("inspect", "left.h5.partial", code=2).stderr
+    assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--salvage").stdout)
     assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--rescue", "left.h5").stdout)
     assert read_meta(tables.folder / "left.h5").excluded
 
