@@ -73,6 +73,15 @@ def test_what_is_recorded_is_the_raw_force(five_newtons):
     assert np.diff(rest).std() == pytest.approx(0.005 * np.sqrt(2), rel=0.15)
 
 
+def test_a_loop_that_swings_ends_the_press():
+    swings = {"settings__force_loop__integral_mm_n_s": 40.0, "settings__force_loop__speed_mm_s": 20.0,
+              "settings__press__error_band_n": 0.3}  # fmt: skip
+    found = on_spring(5.0, ramp(5.0, 0.5, 6.0), **(RARER | swings))
+    assert found.press.state is PressState.FAILED
+    # Which comes first depends on where the swing has found the surface.
+    assert re.search("off the wanted|softest|ceiling|touch", found.acquisition.ended)
+
+
 def test_the_recording_says_what_happened(five_newtons):
     drawn = five_newtons.acquisition.drawn
     assert drawn["press state"] == "done"

@@ -61,7 +61,6 @@ _READ_BACK = {
     "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GPL": "GPL",
     "GNL": "GNL",
 }  # fmt: skip
-_ABOUT = {"VER": "EMULATOR", "GTYP": "linear motor, Faulhaber ASCII", "GSER": "0"}
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
@@ -258,7 +257,7 @@ class Drive:
             case _ if name in _READ_BACK:
                 found = self.settings[_READ_BACK[name]]
             case _:
-                return _ABOUT.get(name)
+                return "EMULATOR" if name == "VER" else None
         return str(int(found))
 
 
