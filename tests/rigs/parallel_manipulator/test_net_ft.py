@@ -104,8 +104,8 @@ def box(wrench=pressed, rate_hz=1000.0, faults=()):
     return made
 
 
-def start(emulator, now_s=0.0, records=0, command=Command.START_REALTIME):
-    return emulator.feed(encode_request(command, records), now_s)
+def start(emulator, now_s=0.0):
+    return emulator.feed(encode_request(Command.START_REALTIME), now_s)
 
 
 @pytest.mark.parametrize(("asked", "sent"), [(1000, 1000), (7000, 7000), (3000, 3500), (999, 1000), (1, 1)])
@@ -116,14 +116,12 @@ def test_rates_divide_that_of_the_sensor(asked, sent):
     assert len(emulator.poll(1.0)) == sent
 
 
-def test_counts_end_by_themselves_and_stop_ends_the_rest():
+def test_a_box_that_is_stopped_sends_nothing():
     emulator = box()
-    start(emulator, records=10)
-    assert len(emulator.poll(1.0)) == 10
-    assert emulator.next_s() == np.inf
     start(emulator, 1.0)
     assert len(emulator.poll(1.05)) == 50
     emulator.feed(encode_request(Command.STOP), 1.05)
+    assert emulator.next_s() == np.inf
     assert emulator.poll(2.0) == []
     assert emulator.feed(b"hello", 2.0) == []
 
