@@ -259,22 +259,13 @@ class ParallelManipulator(Rig):
         identity = {**session.identity, sensor.name: driver.identify()}
         force, limits = session.measured_limits()
         press = Press(settings.press_plan(facts.resolution, guard.force_stream), _course(scene))
-        control: Control | None = None
-
-        def carry(until_ns: int) -> None:
-            if control is not None:
-                control.carry(until_ns)
-
-        reading = stack.enter_context(
-            Reading({sensor.name: driver}, clock=clock, advance=None if emulators is None else carry)
-        )
-
-        def received() -> int:
-            return sum(one.received for one in reading.stream_counts.values())
-
+        control: Control  # made below: it counts the rows of the reading that it advances
+        advance = None if emulators is None else lambda until_ns: control.carry(until_ns)
+        reading = stack.enter_context(Reading({sensor.name: driver}, clock=clock, advance=advance))
         stack.callback(_disarm, session)
         control = Control(
-            guard, limits, guard.arm(limits), press, received, clock,
+            guard, limits, guard.arm(limits), press,
+            lambda: sum(one.received for one in reading.stream_counts.values()), clock,
             period_s=1 / settings.force_loop.rate_hz, stale_s=1e-3 * settings.press.stale_ms,
         )  # fmt: skip
         stack.callback(control.stop)

@@ -189,8 +189,3 @@ def test_a_place_is_gone_to_by_rising_crossing_and_lowering():
     points = forward(LV, np.array(list(way_points(LV, places))))
     assert points[-1] == pytest.approx(places[-1], abs=1e-12)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= 1e-3 + 1e-12
-
-
-def test_a_way_with_a_place_out_of_the_workspace_is_refused_before_it_begins():
-    with pytest.raises(PlaceRefusedError):
-        way(LV, (0.0, 0.0, -0.15), (0.2, 0.0), -0.142, -0.150)

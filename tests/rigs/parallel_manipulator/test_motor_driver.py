@@ -92,22 +92,6 @@ def test_it_is_watched_without_being_moved():
     driver.close()
 
 
-# Moves ----------------------------------------------------------------------------------------------------------------
-
-
-def test_a_move_ends_at_its_target_while_it_is_watched():
-    driver, link = ready()
-    assert driver.move_to(3e-3) == pytest.approx(500 * STEP_M)
-    assert driver.moving
-    finish(driver, link)
-    assert place(link) == pytest.approx(3e-3, abs=STEP_M / 2)
-    (block,) = driver.read(0.0) or driver.read(1.0)
-    positions = block.data[:, 0]
-    assert len(positions) > 3
-    assert (np.diff(positions) >= 0).all()
-    assert driver.state.target == pytest.approx(3e-3)
-
-
 # Homing ---------------------------------------------------------------------------------------------------------------
 
 

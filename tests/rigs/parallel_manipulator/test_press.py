@@ -97,14 +97,6 @@ def test_a_first_touch_stays_within_its_bound():
     assert 0.1 < found.press.touch_n <= largest_force_n(0.1, 20e3, 0.5e-3, 1.0, 0.02) <= 0.31
 
 
-def test_a_motor_that_finds_its_place_at_an_end_stop_presses():
-    homing = {"homing": "end-stop", "homing_speed_m_s": -0.002, "homing_current_a": 0.2, "home_m": -4.5e-3}
-    options = {f"devices__motor__options__{name}": value for name, value in homing.items()}
-    found = on_spring(5.0, ramp(1.0, 0.3, 1.5), **(RARER | options))
-    assert found.acquisition.ended == ""
-    assert abs(found.press.contact_m - 1e-3 * found.acquisition.drawn["skin mm"]) < 30e-6
-
-
 def test_a_motor_that_does_not_come_out_is_said():
     found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=8"], **RARER)
     assert found.acquisition.ended.startswith(f"in ramp: {Trigger.AXIS_LOST}")
