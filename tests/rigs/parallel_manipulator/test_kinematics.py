@@ -109,7 +109,6 @@ def test_what_is_no_number_is_refused():
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"azimuth_deg": (0.0, 0.5, 240.0)}, "same azimuth"),
         ({"joint_lowest_mm": 300.0}, "lowest"),
         ({"link_mm": 0.0}, "link_mm"),
         ({"arm_mm": 1.0}, "arm_mm"),
@@ -161,6 +160,12 @@ def test_a_singularity_on_the_way_is_refused():
     wide = LV.model_copy(update={"sideways_deg": 89.0})
     with pytest.raises(PlaceRefusedError, match=" s of"):
         check_move(wide, HOME, np.array([-0.1276, 0.0, -0.05]))
+
+
+def test_two_legs_in_one_direction_permit_no_place():
+    folded = LinearDelta.model_validate(LV.model_dump() | {"azimuth_deg": (0.0, 0.5, 240.0)})
+    with pytest.raises(PlaceRefusedError, match="sigma_U"):
+        check_move(folded, HOME, HOME)
 
 
 def test_the_other_way_of_assembly_is_refused():
