@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tactbench.plugin import Quality
 from tactbench.plugin.devices import (
     DriverSettings,
+    EmulatorSettings,
     NotReadyError,
     PositionerError,
     PositionerSilentError,
@@ -23,17 +24,16 @@ STEP_M = 6e-6
 LIMITS = {"lower_m": -9e-3, "upper_m": 9e-3, "speed_m_s": 0.05, "acceleration_m_s2": 1.0, "corridor_m": 12e-6}
 
 
-def nothing(position_m):
-    return 0.0
-
-
 def wall(at_m, stiffness):
     """Return a spring [N/m] that begins at a position."""
     return lambda position_m: stiffness * max(0.0, position_m - at_m)
 
 
-def motor(load=nothing, options=None, **more):
-    return MotorEmulator(load, np.random.default_rng(15), options, **more)
+def motor(load=None, faults=()):
+    made = MotorEmulator(EmulatorSettings(lambda at_s: {}, np.random.default_rng(15)))
+    made.press_against(load)
+    made.faults = list(faults)
+    return made
 
 
 def driver_on(emulator, **options):
@@ -41,7 +41,7 @@ def driver_on(emulator, **options):
     return FaulhaberDriver(DriverSettings(open_link=lambda: link, options=options, clock=link.clock)), link
 
 
-def ready(load=nothing, faults=(), **options):
+def ready(load=None, faults=(), **options):
     """Return a driver that is homed where it stands and has power, and its link."""
     driver, link = driver_on(motor(load, faults=faults), **(LIMITS | options))
     driver.start()

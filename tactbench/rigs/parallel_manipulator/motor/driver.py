@@ -254,8 +254,10 @@ class FaulhaberDriver(Positioner):
     def move_to(self, position: float, speed: float | None = None) -> float:
         """Begin a move to the increment nearest to a position; the speed is rounded down."""
         self.check_move(position)
-        units = self._usual if speed is None else self.options.speed(speed)
-        return self._go(self.options.increments(position), units)
+        return self._go(self.options.increments(position), self._units(speed))
+
+    def _units(self, speed: float | None) -> int:
+        return self._usual if speed is None else self.options.speed(speed)
 
     def halt(self) -> None:
         """Begin a move to the position read last, whatever is under way: the motor brakes and holds there.
@@ -276,9 +278,8 @@ class FaulhaberDriver(Positioner):
         if math.isnan(self.facts.retreat) or not self.homed:
             self.halt()
             return
-        self._speed, speed = None, self.options.retreat_speed_m_s
-        units = self._usual if speed is None else self.options.speed(speed)
-        self._go(self.options.increments(self.facts.retreat), units)
+        self._speed = None
+        self._go(self.options.increments(self.facts.retreat), self._units(self.options.retreat_speed_m_s))
 
     def _go(self, target: int, speed: int) -> float:
         """Send a move at once, without waiting for an outstanding answer; return its target [m]."""
