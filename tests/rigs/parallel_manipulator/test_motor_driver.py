@@ -161,7 +161,7 @@ def test_a_retreat_takes_the_place_of_a_move_at_any_moment(updates):
 
 def restarted(link, **options):
     """Return another driver on the line of a drive that went on."""
-    link.arrived.clear()
+    link._arrived.clear()
     driver = FaulhaberDriver(DriverSettings(open_link=lambda: link, options=LIMITS | options, clock=link.clock))
     driver.start()
     return driver
@@ -182,7 +182,7 @@ def test_a_drive_that_kept_its_power_knows_its_place():
 @pytest.mark.parametrize("change", ["DI", "APL0", "LL1000"])
 def test_a_drive_that_lost_something_is_homed_anew(change):
     _, link = ready()
-    link.send(change.encode() + b"\r")
+    link.write(change.encode() + b"\r")
     link.go(0.1)
     again = restarted(link)
     assert not again.find_home()
@@ -255,7 +255,8 @@ def test_a_motor_fault_takes_the_power_and_is_a_problem_until_it_is_over():
         driver.enable()
     with pytest.raises(NotReadyError):
         driver.move_to(0.0)
-    link.go(2.0)
+    while link.now_s < 105.0:
+        driver.read(0.1)
     driver.enable()
     assert settled(driver, link).problem == ""
     driver.move_to(0.0)
@@ -295,7 +296,7 @@ def test_any_bytes_from_the_drive_raise_named_errors_only(pieces, seed):
     driver, link = ready()
     rng = np.random.default_rng(seed)
     for piece in pieces:
-        link.arrived.append((link.now_s, piece))
+        link.arrive(piece)
         link.go(rng.uniform(0, 0.05))
         with suppress(PositionerError):
             driver.read(0.05)
