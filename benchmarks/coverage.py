@@ -10,8 +10,7 @@ infinitely many sessions: exact for numbers, from a million rows for classes. Ev
 test nominally 5 %; a binomial deviation of 1,000 trials is 0.7 %.
 
 The intervals and tests are tactbench's own, called as a run and `tactbench compare` call them; what they are held
-against (percentiles of resampled sessions, ranks resampled, rows taken as independent, folds taken as independent) is a
-few lines here.
+against (percentiles of resampled sessions, ranks resampled, rows taken as independent) is a few lines here.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from tactbench.core.evaluation.interval import ReplicateUnits, score_interval
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_of
 from tactbench.core.samples import Answers
-from tactbench.core.statistics.paired import corrected_t, difference
+from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 from tactbench.core.statistics.replicates import least_coverage, median_interval
 
@@ -229,30 +228,6 @@ def ranking(trials: int, seed: int) -> None:
     table(f"Coverage [%] of the ranks of {k} sensors, each worse by a step; a fifth of the trials", columns, lines)
 
 
-def errors(trials: int, seed: int) -> None:
-    """Find no difference between two estimators of equal worth, over folds whose training data overlap."""
-    lines = []
-    n = 100
-    for folds in (5, 10):
-        rng = np.random.default_rng([seed, folds, 1])
-        corrected = naive = 0
-        for _ in range(trials):
-            # Two weak learners that see one of two equally good features each: these data make one of them look better.
-            X = rng.normal(size=(n, 2))
-            y = X.sum(axis=1) + rng.normal(size=n)
-            d = []
-            place = rng.permutation(n) % folds
-            for fold in range(folds):
-                train, test = place != fold, place == fold
-                slope = [(X[train, j] @ y[train]) / (X[train, j] @ X[train, j]) for j in (0, 1)]
-                d.append(np.subtract(*(np.mean((y[test] - slope[j] * X[test, j]) ** 2) for j in (0, 1))))
-            corrected += corrected_t(d, 1 / (folds - 1)).p <= 0.05
-            naive += stats.ttest_1samp(d, 0).pvalue <= 0.05
-        share = [f"{100 * found / trials:.1f}" for found in (corrected, naive)]
-        lines.append([str(folds), *share])
-    table("Differences found [%] where there is none, over folds", ["folds", "corrected", "naive t"], lines)
-
-
 def beyond(trials: int, seed: int) -> None:
     """Cover an answer's own error, slow in time, under a reference with the noise and the holds of the paper."""
     sigma, hold, n = 0.6875, 600, 4400
@@ -306,7 +281,6 @@ PARTS = {
     "boards": boards,
     "differences": differences,
     "ranks": ranking,
-    "errors": errors,
     "floor": beyond,
 }
 

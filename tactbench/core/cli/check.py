@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.grid import print_fields, print_records
 from tactbench.core.cli.options import format_option
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tactbench.core.conformance.run import CheckReport
+from tactbench.core.conformance.check import CHECKS, KINDS, Mode
+from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import json_text
 
 _FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -33,14 +35,6 @@ def command(
     NAME is that of a component, a mapping file, or a plugin with all its components. No device is
     opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
-    from tactbench.core.cli.grid import print_fields, print_records
-    from tactbench.core.conformance.check import CHECKS, KINDS, Mode
-    from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
-    from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.tables.terminal import remark
-    from tactbench.core.tables.text import json_text
-
     if listed:
         checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds), "mode": one.mode,
                    "why": one.why, "do": one.cure} for one in CHECKS]  # fmt: skip

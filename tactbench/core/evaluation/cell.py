@@ -16,19 +16,28 @@ import numpy as np
 from pydantic import Field
 
 from tactbench.core.errors import DataError, PluginContractError
-from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
 from tactbench.core.evaluation.dataset import LARGEST, Dataset, alike
 from tactbench.core.evaluation.delay import (
+    CALLS_OF_P95,
     Clock,
     answer_delay_ms,
+    calls_s,
     features_s,
     peak_rss_mb,
-    single_row_latency_s,
     stated_delay_ms,
-    tail_ms,
 )
-from tactbench.core.evaluation.event_answers import EventRules, state_figures
-from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
+from tactbench.core.evaluation.event_answers import EventRules
+from tactbench.core.evaluation.fitting import (
+    AnsweredFold,
+    Configured,
+    FittedFold,
+    answered_fold,
+    builder,
+    features_of,
+    fitted_fold,
+    one_model_a_component,
+    routed,
+)
 from tactbench.core.evaluation.folds import TaskData, load_task
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
@@ -128,8 +137,8 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
         for number, assignment in enumerate(data.assignments):
             fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
             answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
-        cost, delay_remarks = _cost(fitted, answered, data, descriptor, context)
-    return _result(answered, data, descriptor, metric, rules, cost, delay_remarks, counts)
+        cost, delay_remark = _cost(fitted, answered, data, descriptor, context)
+    return _result(answered, data, descriptor, metric, rules, cost, delay_remark, counts)
 
 
 def _cost(
@@ -138,31 +147,27 @@ def _cost(
     data: TaskData,
     descriptor: EstimatorDescriptor,
     context: CellContext,
-) -> tuple[Cost, tuple[str, ...]]:
-    """Return the cost of all folds, with the answer delay of the last fold's model, and remarks on the delay."""
-    parts, remarks = stated_delay_ms(data, descriptor, max(fitted.k, data.window - 1))
-    p50 = p95 = largest = calls = None
+) -> tuple[Cost, str]:
+    """Return the cost of all folds, with the answer delay of the last fold's model, and a remark on the delay."""
+    parts, remark = stated_delay_ms(data, descriptor, max(fitted.k, data.window - 1))
+    times: dict[str, Any] = dict.fromkeys(("latency_ms_p50", "latency_ms_p95", "latency_n"))
+    times |= {key: sum(one.spent[key] for one in answered) for key in answered[0].spent}
     if context.latency:
-        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), context.clock)
-        p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
-        p95, largest = tail_ms(waits_s)
+        X = features_of(fitted.fold.test, descriptor)
+        waits_ms = 1e3 * calls_s(len(X), lambda place: X[place : place + 1], fitted.model.predict, context.clock)
+        p95 = float(np.quantile(waits_ms, 0.95)) if len(waits_ms) >= CALLS_OF_P95 else None
+        times |= {"latency_ms_p50": float(np.median(waits_ms)), "latency_ms_p95": p95, "latency_n": len(waits_ms)}
         ready_s = features_s(data, descriptor, fitted.fold.test.X, fitted.k, context.clock)
-        parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
+        parts |= {} if ready_s is None else {"features": 1e3 * ready_s}
+        parts["prediction"] = times["latency_ms_p50"]
     cost = Cost(
-        search_s=sum(one.search_s for one in answered),
-        fit_s=sum(one.fit_s for one in answered),
-        predict_s=sum(one.predict_s for one in answered),
-        batch_rows=sum(one.batch_rows for one in answered),
-        latency_ms_p50=p50,
-        latency_ms_p95=p95,
-        latency_ms_max=largest,
-        latency_n=calls,
+        **times,
         answer_delay_ms=answer_delay_ms(parts, descriptor.looks_at),
         delay_parts_ms=parts,
         threads=context.threads,
         peak_rss_mb=peak_rss_mb(),
     )
-    return cost, remarks
+    return cost, remark
 
 
 def _result(
@@ -172,7 +177,7 @@ def _result(
     metric: Metric,
     rules: EventRules | None,
     cost: Cost,
-    delay_remarks: Sequence[str],
+    delay_remark: str,
     counts: Counter[str],
 ) -> Result:
     task, made = data.task, data.data
@@ -196,7 +201,6 @@ def _result(
     if metric.kind == "regression":
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
-            remarks.append(f"answers are vectors ({', '.join(task.target.names)}): one model per component")
         floor, no_floor = reference_floor(task, metric, data.recorded if data.window else made, tested)
         remarks.append(no_floor)
         truth = None if metric.function else true_force(task, made, tested)
@@ -219,13 +223,10 @@ def _result(
         beside["events"] = rules.figures(detected, compute_s)
         if not beside["events"]["alarms"]:
             remarks.append("never alarms at its operating point")
-        beside["operating_points"] = rules.operating_points(detected, compute_s)
-    elif task.answer_per == "frame":
-        scores |= state_figures(tested, made)
     held_s = tare_s(data.recorded) if data.rules.tare else 0.0
     if data.rules.tare and not held_s:
         remarks.append("not tared: no recording states an unloaded hold")
-    remarks += delay_remarks
+    remarks.append(delay_remark)
     took_part, left_out, stamps = _part_taken(data)
     specimens = {meta.labels.get("unit") for meta in took_part}
     interval = score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes)
@@ -248,14 +249,8 @@ def _result(
         replicates=summed(metric, tested, unit, n_classes, floor, truth) if data.unit else {},
         classes=classes,
         chosen=_chosen(answered, rules),
-        search=[
-            {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": one.name}
-            for one in answered
-            if one.choice
-            for candidate in one.choice.compared
-        ],
         counts=dict(counts + Counter(left_out)),
-        dagger=data.rules.uses_test_statistics,
+        dagger=data.rules.three_sigma,
         stamps=stamps,
         findings=[*data.recorded.findings, *_groups_alike(data), *_untrained(answered)],
         tare_s=held_s or None,
@@ -297,11 +292,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
 
 
 def _of_answers(data: TaskData) -> list[str]:
-    """Return remarks on answers to whole recordings and to frames, for the report."""
-    if data.task.answer_per == "recording":
-        return [
-            f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
-        ]
+    """Return remarks on answers to frames, for the report."""
     if data.task.answer_per != "frame":
         return []
     remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]
@@ -347,7 +338,7 @@ def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[
     for one in answered:
         values = {**one.choice.params, "k": one.choice.k} if one.choice else {}
         if rules is not None and rules.own_threshold is None:
-            values["threshold"] = one.detected[0].thresholds[0]
+            values["threshold"] = one.detected[0].threshold
         for name, value in values.items():
             if isinstance(value, int | float) and np.isfinite(value):
                 each.setdefault(name, {})[one.name] = float(value)

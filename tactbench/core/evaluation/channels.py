@@ -100,23 +100,6 @@ def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recordin
     return out
 
 
-def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData) -> str:
-    """Return a text on the time spans [s] of `clock` and of the target channel; empty if either is unknown."""
-    found = channels_for(recording, target)
-    if len(found) != 1:
-        return ""
-    name, place, channel = found[0]
-    other = recording.read(name)
-    if clock.t_ns is None or other.t_ns is None or np.isnan(numbers(other)[:, place]).all():
-        return ""
-    (start, end), (first, last) = (times[[0, -1]] / 1e9 for times in (clock.t_ns, other.t_ns))
-    later = first - start
-    return (
-        f"{clock.spec.name} runs from {start:.3f} to {end:.3f} s, and {channel.name} from {first:.3f} to {last:.3f} s: "
-        f"it begins {abs(later):.3f} s {'later' if later > 0 else 'earlier'}"
-    )
-
-
 def unit_factor(channel: ChannelSpec, unit: str) -> float:
     """Return the factor from stored numbers to `unit`, from the channel's unit or else from the channel's scale."""
     try:

@@ -17,7 +17,6 @@ from tactbench.core.evaluation.channels import (
     channel_on,
     channels_for,
     feature_streams,
-    never_meeting,
     numbers,
     on_clock,
     read_channel,
@@ -69,8 +68,6 @@ class Table:
     """Each stream on its own clock, times in s since the table's first row; only for tasks on summaries or frames"""
     reference: SlipReference | None = None
     """Slip measured by the reference sensor, on that sensor's clock; only for slip tasks"""
-    apart: str = ""
-    """Text on the time spans of features and target if no sample of one is near a sample of the other, else empty"""
 
     def taken(self, rows: slice | IntArray | Mask) -> Table:
         """Return a table of the selected rows only."""
@@ -101,8 +98,6 @@ class Dataset:
     """Files that the tables were read from, in the same order"""
     whole: bool = False
     """True if the task has one answer for each recording or frame, so that no split may cut a recording"""
-    vote: bool = False
-    """True if the answer to a recording is combined from the answers to its rows"""
 
     @property
     def labelled(self) -> Mask:
@@ -197,15 +192,9 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         )
     target, labelled = _target_name(task), np.concatenate([table.labelled for table in tables])
     if not labelled.any():
-        apart = next((one for one in tables if one.apart), None)
-        if apart is not None:
-            raise DataError(
-                f"No reading of any recording is near a {target} in time: in {apart.meta.name!r}, {apart.apart}.",
-                hint="Correct the times of one stream: it may be in another time zone, or count from another start.",
-            )
         raise NotApplicable(
             f"No recording has any {target}, which task {task.name!r} asks for.",
-            hint="State this target in the mapping, or choose another task.",
+            hint="State this target in the mapping, correct the times of its stream, or choose another task.",
         )
     if not labelled.all():
         counts[f"of {len(labelled)} rows have no {target} and were left out"] = int((~labelled).sum())
@@ -219,7 +208,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     if whole:
         tables = [_whole(table, task, target) for table in tables]
     findings = (*_in_some(seen, len(tables)), *_left_out(tables, task, target), *alike("classes", classes))
-    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole, bool(task.vote))
+    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole)
 
 
 def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:
@@ -250,8 +239,7 @@ def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[
     out = [table for table in tables if not table.labelled.any()]
     if out:
         names = ", ".join(one.meta.name for one in out[:MOST_NAMED]) + (", …" if len(out) > MOST_NAMED else "")
-        apart = next((f" ({one.meta.name}: {one.apart})" for one in out if one.apart), "")
-        yield f"{len(out)} of {len(tables)} recordings left out, without any {target}: {names}{apart}"
+        yield f"{len(out)} of {len(tables)} recordings left out, without any {target}: {names}"
     there = [table for table in tables if table.labelled.any()]
     rows, labelled = sum(table.rows for table in there), np.concatenate([table.labelled for table in there])
     missing = {
@@ -274,13 +262,9 @@ def alike(what: str, labels: Iterable[Any]) -> Iterator[str]:
 def _whole(table: Table, task: TaskSpec, target: str) -> Table:
     """Return a recording with only those group labels that are constant in it, so that no split can cut it.
 
-    If the task has one answer per recording, a channel target becomes one number, and a changing label is refused.
+    If the task has one answer per recording, a changing label is refused.
     """
-    there = table.y[table.labelled]
-    if task.answer_per == "recording" and isinstance(task.target, ChannelTarget) and len(there):
-        number = there.max() if task.target.reduce == "max" else there.mean()
-        table = replace(table, y=np.full(len(table.y), number), labelled=np.ones(len(table.y), dtype=bool))
-    elif task.answer_per == "recording" and len(np.unique(there)) > 1:
+    if task.answer_per == "recording" and len(np.unique(table.y[table.labelled])) > 1:
         raise NotApplicable(
             f"Task {task.name!r} has one answer per recording, but {target} changes within {table.meta.name!r}.",
             hint="Cut recordings where it changes (`recording` in the mapping), or choose a task on single samples.",
@@ -304,7 +288,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
         picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
         values = numbers(stream)[:, picked]
         _count_flags(stream, picked, counts)
-        if task.summaries or task.features_by:
+        if task.summaries:
             own.append(_own_readings(stream, clock, picked, values, counts))
         names = [stream.spec.channels[place].name for place in picked]
         columns |= dict(zip(names, on_clock(values, stream, clock, meta.name).T, strict=True))
@@ -316,7 +300,6 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
             hint="Leave the channel out of the mapping, or record it again.",
         )
     y, labelled = _target(recording, task, clock)
-    targets = [] if labelled.any() else _channels_of(task)
     for name, column in (columns | ({"the target": y} if task.kind == "regression" else {})).items():
         require_computable(column, name, meta)
     force = y if isinstance(task.target, ChannelTarget) and task.target.kind == "force" else None
@@ -344,7 +327,6 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
         groups=_groups(meta, clock, task),
         readings=tuple(own),
         reference=reference,
-        apart=next(filter(None, (never_meeting(recording, one, clock) for one in targets)), ""),
     )
     return tuple(columns), table.taken(whole)
 

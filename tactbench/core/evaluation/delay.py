@@ -8,10 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.dataset import Table
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
+from tactbench.core.evaluation.sets import FeatureScale, causal_mean
 from tactbench.core.evaluation.summaries import (
     frame_features,
     frame_times,
@@ -20,7 +20,6 @@ from tactbench.core.evaluation.summaries import (
     recording_features,
     slip_target,
 )
-from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -30,9 +29,6 @@ from tactbench.core.spec.task import TaskSpec
 T = TypeVar("T")
 Clock = Callable[[], float]
 """Function that returns the time in seconds, which never decreases."""
-
-RATE_TOLERANCE = 0.01
-"""Relative difference of two rates above which a remark is made: rates are stated to two or three digits."""
 
 SLOWEST_S = 1.0
 """Interval [s] above which rows are taken as single readings (one per press), without a sampling interval (assumed)."""
@@ -46,8 +42,8 @@ RECORDINGS_TIMED = 3
 """Number of recordings on which the features of frames are timed; each has hundreds of frames."""
 
 
-def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parts of the answer delay that do not depend on the machine, in ms, and remarks on them.
+def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> tuple[dict[str, float], str]:
+    """Return the parts of the answer delay that do not depend on the machine, in ms, and a remark on unknown parts.
 
     Parameters
     ----------
@@ -56,10 +52,10 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
 
     Returns
     -------
-    dict, tuple
+    dict, str
         ``sampling``: one sampling interval of the slowest stream used, the longest time from a change to the next
-        sample. The interval is that of the sensor's own rate; if the sensor states no rate, or the recorded times show
-        a slower one, that of the recordings. For frames, the step between frames if that is longer.
+        sample. The interval is that of the sensor's own rate if the rig states one, else the longer one of the stated
+        rate and the recorded times. For frames, the step between frames if that is longer.
         ``link``: the link delay that the sensor's spec states.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
         samples has linear phase of slope (n - 1) / 2; Oppenheim and Schafer, Discrete-Time Signal Processing, section
@@ -68,60 +64,56 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
         one answer per recording, the time span of the samples used.
         An unknown part is absent; for answers that use no reading the dict is empty.
     """
-    task, rules, recorded = data.task, data.rules, data.recorded
+    task, rules, features = data.task, data.rules, data.recorded.features
     frames = task.answer_per == "frame"
     if estimator.looks_at != "features" and not (frames and estimator.looks_at == "reference"):
-        return {}, ()
-    parts, remarks = _reading_delay_ms(recorded, rules, 0 if frames else k)
-    if frames:
-        target = slip_target(task)
-        rates = [
-            stream.rate_hz
-            for table in recorded.tables
-            for stream in table.readings
-            if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in data.feature_names)
-        ]
-        parts["sampling"] = 1e3 * max([target.hop_s, *(1.0 / rate for rate in rates if rate)])
-        parts["window"] = 1e3 * target.window_s / 2 if estimator.looks_at == "features" else 0.0
-    elif task.answer_per == "recording":
-        spans = [0.0 if rules.first_row_only else _span_s(recorded, table, task, rules) for table in recorded.tables]
-        parts.pop("window", None)
-        if (longest := _largest(spans)) is not None:
-            parts["window"] = 1e3 * longest
-    return parts, remarks
+        return {}, ""
+    sampling: list[float | None] = []
+    links: list[float | None] = []
+    windows: list[float | None] = []
+    for table in data.recorded.tables:
+        wait_s, row_s = _wait_s(table, features, rules), _row_s(table, features, rules)
+        link = table.meta.sensor.link_delay
+        links.append(None if link is None else link.to("s"))
+        sampling.append(max(wait_s, slip_target(task).hop_s) if frames and wait_s else wait_s)
+        if frames:
+            windows.append(slip_target(task).window_s / 2 if estimator.looks_at == "features" else 0.0)
+        elif rules.first_row_only or (k == 0 and task.answer_per == "sample"):
+            windows.append(0.0)
+        elif task.answer_per == "recording":
+            windows.append(_span_s(table, task, rules))
+        else:
+            windows.append(None if row_s is None else row_s * k / 2)
+    longest = {"sampling": _largest(sampling), "link": _largest(links), "window": _largest(windows)}
+    parts = {name: 1e3 * seconds for name, seconds in longest.items() if seconds is not None}
+    unknown = NO_LINK if "link" not in parts else ""
+    return parts, unknown if {"sampling", "window"} <= parts.keys() else NO_RATE
 
 
-def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
-    parts: dict[str, float] = {}
-    interval_s = _row_interval_s(data, rules)
-    remarks: dict[str, None] = {}
-    waits_ms: list[float | None] = []
-    for meta in data.metas:
-        for place, stream in enumerate(_used(meta, data)):
-            stated_hz = stream.rate_hz and stream.rate_hz / rules.every
-            sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stated_hz
-            own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz)
-            own_hz = own_hz / rules.every if own_hz else sampled_hz
-            # A rig may record a sensor below its own rate; unless the rig states that, the clock outweighs the spec.
-            slower = sampled_hz and own_hz and sampled_hz < (1 - RATE_TOLERANCE) * own_hz
-            waited_hz = sampled_hz if slower and stream.name not in meta.own_rates_hz else own_hz
-            waits_ms.append(1e3 / waited_hz if waited_hz else None)
-            if own_hz and sampled_hz and abs(sampled_hz - own_hz) > RATE_TOLERANCE * own_hz:
-                remarks[f"{stream.name} sampled at {sampled_hz:.4g} Hz; its own rate is {own_hz:.4g} Hz"] = None
-    if (wait_ms := _largest(waits_ms)) is not None:
-        parts["sampling"] = wait_ms
-    links = [meta.sensor.link_delay for meta in data.metas]
-    if (link_ms := _largest([None if link is None else link.to("ms") for link in links])) is not None:
-        parts["link"] = link_ms
-    else:
-        remarks[NO_LINK] = None
-    if k == 0 or rules.first_row_only:
-        parts["window"] = 0.0
-    elif interval_s:
-        parts["window"] = 1e3 * interval_s * k / 2
-    if not {"sampling", "window"} <= parts.keys():
-        remarks = {NO_RATE: None}
-    return parts, tuple(remarks)
+def _wait_s(table: Table, features: Sequence[str], rules: ProtocolSpec) -> float | None:
+    """Return the longest sampling interval [s] of the streams with features; None if that of a stream is unknown."""
+    by_clock = {one.stream: 1.0 / one.rate_hz for one in table.readings if one.rate_hz}
+    waits = []
+    for place, stream in enumerate(_used(table.meta, features)):
+        own_hz = table.meta.own_rates_hz.get(stream.name)
+        stated_hz = own_hz or stream.rate_hz
+        # A rig may record a sensor below its own rate; unless the rig states that, the clock outweighs the spec.
+        recorded_s = 0.0 if own_hz else by_clock.get(stream.name, 0.0 if place else _step_s(table))
+        waits.append(max(rules.every / stated_hz if stated_hz else 0.0, recorded_s) or None)
+    return _largest(waits)
+
+
+def _step_s(table: Table) -> float:
+    """Return the median interval [s] between rows; 0 without a clock, or where rows are single readings."""
+    timed = table.meta.clock != "none" and len(table.time_s) > 1
+    step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
+    return step_s if step_s <= SLOWEST_S else 0.0
+
+
+def _row_s(table: Table, features: Sequence[str], rules: ProtocolSpec) -> float | None:
+    """Return the interval [s] between rows by the clock, or else by the stated rate; None if both are unknown."""
+    rate_hz = _used(table.meta, features)[0].rate_hz
+    return _step_s(table) or (rules.every / rate_hz if rate_hz else None)
 
 
 def answer_delay_ms(parts_ms: Mapping[str, float], looks_at: str) -> float | None:
@@ -133,47 +125,24 @@ def answer_delay_ms(parts_ms: Mapping[str, float], looks_at: str) -> float | Non
     return sum(parts_ms.values()) if all(name in parts_ms for name in needed) else None
 
 
-def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
-    """Return the streams with features in `data`; first the stream whose clock times the rows."""
-    used = [one for one in meta.sensor.streams if any(channel.name in data.features for channel in one.channels)]
-    return sorted(used, key=lambda one: all(channel.name != data.features[0] for channel in one.channels))
-
-
-def _row_interval_s(data: Dataset, rules: ProtocolSpec) -> float | None:
-    """Return the longest interval [s] between rows of a recording, taken as the median step of the clock.
-
-    Without a clock, or where rows are single readings, the stream's stated rate gives the interval; None without both.
-    """
-    found: list[float | None] = []
-    for table in data.tables:
-        timed = table.meta.clock != "none" and len(table.time_s) > 1
-        step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
-        rate_hz = _used(table.meta, data)[0].rate_hz
-        found.append(step_s if 0 < step_s <= SLOWEST_S else rules.every / rate_hz if rate_hz else None)
-    return _largest(found)
+def _used(meta: RecordingMeta, features: Sequence[str]) -> list[StreamSpec]:
+    """Return the streams with features; first the stream whose clock times the rows."""
+    used = [one for one in meta.sensor.streams if any(channel.name in features for channel in one.channels)]
+    return sorted(used, key=lambda one: all(channel.name != features[0] for channel in one.channels))
 
 
 def _largest(values: Sequence[float | None]) -> float | None:
-    """Return the largest of `values`; None if the sequence is empty or contains None."""
+    """Return the largest of `values`; None if the sequence contains None."""
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) else None
 
 
-def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
-    if task.vote:
-        times_s = table.time_s[asked_for(table, rules)]
-        if table.meta.clock == "none":
-            interval_s = _row_interval_s(data, rules)
-            return None if interval_s is None else len(times_s) * interval_s
-        return float(np.ptp(times_s)) if len(times_s) else 0.0
+def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    """Return the time span [s] of the windows of a recording's summaries; None if it is unknown."""
     length = _largest([_length_s(stream) for stream in kept(table, rules)])
     if length is None:
         return None
-    windows = [(one.start, one.end) if one.unit == "s" else (one.start * length, one.end * length)
-               for one in task.summaries]  # fmt: skip
-    if task.features_by:
-        windows.append((0.0, length))
-    return max(end for _, end in windows) - min(start for start, _ in windows)
+    return length * (max(one.end for one in task.summaries) - min(one.start for one in task.summaries))
 
 
 def _length_s(stream: StreamReadings) -> float | None:
@@ -213,21 +182,6 @@ def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k:
     return float(np.median(calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, AT_LEAST)))
 
 
-def single_row_latency_s(model: Estimator, X: FloatArray, clock: Clock) -> FloatArray:
-    """Return the (calls,) durations [s] of calls of ``predict`` on one row each, whose features are ready.
-
-    From 20 to 200 calls are made, and no further ones after 0.3 s; one call before is not counted. Rows are spread
-    over `X`, because a model may answer some rows faster than others.
-    """
-    return calls_s(len(X), lambda place: X[place : place + 1], model.predict, clock)
-
-
-def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
-    """Return the 95th percentile [ms] of durations [s], None for fewer than 200 calls, and the largest [ms]."""
-    enough = len(spent_s) >= CALLS_OF_P95
-    return float(1e3 * np.quantile(spent_s, 0.95)) if enough else None, float(1e3 * spent_s.max())
-
-
 def calls_s(
     rows: int,
     given: Callable[[int], T],
@@ -235,7 +189,11 @@ def calls_s(
     clock: Clock,
     at_most: int = AT_MOST,
 ) -> FloatArray:
-    """Return the (calls,) durations [s] of ``work(given(i))``, for row numbers i spread over `rows` rows."""
+    """Return the (calls,) durations [s] of ``work(given(i))``, for row numbers i spread over `rows` rows.
+
+    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Rows are
+    spread because a model may answer some rows faster than others.
+    """
     places = np.linspace(0, rows - 1, at_most).astype(int)
     work(given(places[0]))  # the first call of a library takes longer
     spent: list[float] = []

@@ -73,8 +73,8 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
     (n - tau) sigma²``, so that the floor of a low-pass filtered reference is correct too.
     """
     target = task.target
-    if metric.name != "rmse" or not isinstance(target, ChannelTarget) or target.kind != "force" or target.reduce:
-        return None, ""  # a number of many samples has not the noise of one
+    if metric.name != "rmse" or not isinstance(target, ChannelTarget) or target.kind != "force":
+        return None, ""
     holds: dict[int, FloatArray] = {}
     for place in np.unique(tested.recording).tolist():
         table = data.tables[place]
@@ -142,9 +142,9 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
     recorded.
     """
     target = task.target
-    if not isinstance(target, ChannelTarget) or target.kind != "force" or target.name not in (None, "normal"):
+    if not isinstance(target, ChannelTarget) or (target.kind, target.unit) != ("force", "N"):
         return None
-    if target.unit != "N" or target.reduce:
+    if target.name not in (None, "normal"):
         return None
     out = np.zeros(len(tested))
     for place in np.unique(tested.recording).tolist():

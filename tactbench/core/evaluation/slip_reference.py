@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +11,13 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.channels import channel_on, channels_for, require_forward
+from tactbench.core.events.alarms import GroundTruth
 from tactbench.core.events.labels import UNDECIDED, SlipLabels, slip_labels
 from tactbench.core.recording.reader import Recording
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.task import ChannelTarget
 
-SCALES = (1.0, 0.5, 2.0)
-"""Factors on the thresholds of slip labels: as stated, halved and doubled."""
 _CHANNELS = (
     ChannelTarget(kind="force", name="normal", unit="N"),
     ChannelTarget(kind="force", name="tangential", unit="N"),
@@ -33,14 +31,11 @@ class SlipReference:
 
     t_ns: IntArray
     """(n,) times [ns] since the first row of the sensor's clock"""
-    displacement_m: FloatArray
-    """(n,) displacement [m] of the surface relative to the sensor's skin"""
     force_share: FloatArray
     """(n,) ratio of tangential force to friction coefficient times normal force; 0 without contact"""
     normal_n: FloatArray
     """(n,) normal force [N]"""
-    labels: Mapping[float, SlipLabels]
-    """Slip labels by factor on the thresholds, without factors for which the surface is never at rest"""
+    labels: SlipLabels
     disturbance: bool
     """True if the whole recording is a disturbance without slip"""
 
@@ -54,9 +49,16 @@ class SlipReference:
         there = (place >= 0) & (ends_ns <= self.t_ns[-1] + step)
         return np.where(there, values[np.maximum(place, 0)], missing)
 
-    def state(self, ends_ns: IntArray, scale: float = 1.0) -> IntArray:
+    def state(self, ends_ns: IntArray) -> IntArray:
         """Return the (k,) slip states at (k,) times [ns]; ``UNDECIDED`` where the reference has no sample."""
-        return self.at(ends_ns, self.labels[scale].state, UNDECIDED)
+        return self.at(ends_ns, self.labels.state, UNDECIDED)
+
+    def truth(self, ends_ns: IntArray) -> GroundTruth:
+        """Return the events from the first frame on, for frames that end at (n,) times [ns]."""
+        begin, close = int(ends_ns[0]), int(ends_ns[-1]) + 1
+        onset = self.labels.gross_ns[:, 0]
+        events = self.labels.gross_ns[(onset >= begin) & (onset < close)]
+        return GroundTruth(events, self.disturbance, (begin, close))
 
 
 def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
@@ -95,14 +97,11 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
             f"Label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
             hint="State the coefficient of friction, a number above 0.",
         )
-    labels = {}
-    for scale in SCALES:
-        try:
-            labels[scale] = slip_labels(t_ns, slip, tangential, normal, friction, target.thresholds.scaled(scale))
-        except DataError as error:
-            if scale == 1.0:
-                raise DataError(f"Recording {name!r}: {error.message}", hint=error.hint) from error
+    try:
+        labels = slip_labels(t_ns, slip, tangential, normal, friction, target.thresholds)
+    except DataError as error:
+        raise DataError(f"Recording {name!r}: {error.message}", hint=error.hint) from error
     contact = normal >= target.thresholds.contact_force_n
     share = np.divide(np.abs(tangential), friction * normal, out=np.zeros_like(normal), where=contact)
     label, value = target.disturbance
-    return SlipReference(t_ns, slip, share, normal, labels, str(recording.meta.labels.get(label)) == value)
+    return SlipReference(t_ns, share, normal, labels, str(recording.meta.labels.get(label)) == value)

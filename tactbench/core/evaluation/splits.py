@@ -229,7 +229,7 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
     if split == "session":
         return [_held_out(data, split, {name}, name) for name in names]
     if (one_by_one or split in ONE_BY_ONE) and len(names) <= MOST_ONE_BY_ONE:
-        return [_told(_held_out(data, split, {name}, f"{split} {name}"), data) for name in names]
+        return [_held_out(data, split, {name}, f"{split} {name}") for name in names]
     return [_held_out(data, split, values, f"{split} fold {number}") for number, values in enumerate(_dealt(sizes), 1)]
 
 
@@ -274,18 +274,6 @@ def _cut_in_time(data: Dataset, rows: Mask, gap: int, fewest: int) -> tuple[Mask
         before.append(mask & (number < first - gap) & enough)
         after.append(mask & (number >= first))
     return np.concatenate(before), np.concatenate(after)
-
-
-def _told(fold: Assignment, data: Dataset) -> Assignment:
-    """Add "interpolated" or "extrapolated" to the name of a fold with one test value, by the range of training."""
-    y = data.column(lambda table: table.y)
-    if data.classes or y.ndim > 1:
-        return fold
-    train, test = (y[rows & data.labelled] for rows in (fold.train, fold.test))
-    if not len(train) or not len(test) or np.ptp(test) > 0:
-        return fold
-    between = train.min() < test[0] < train.max()
-    return replace(fold, name=f"{fold.name}, {'interpolated' if between else 'extrapolated'}")
 
 
 def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:

@@ -64,7 +64,7 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
     Parameters
     ----------
     onset_ns, alarm_ns
-        (n,) and (m,) times [ns], in any order.
+        (n,) and (m,) rising times [ns].
     policy
         Policy whose window limits pairs: an alarm matches an onset from `window_before_s` before the onset to
         `window_after_s` after it, both ends included.
@@ -74,7 +74,7 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
     In order of time, each event is paired with the earliest unpaired alarm in its window. All windows are equally long,
     so that their starts and ends are in the same order: a skipped alarm is too early for all later events, and taking
     the earliest alarm leaves later events at least as many alarms. The number of pairs is therefore the largest
-    possible [1]_ (a convex bipartite graph whose intervals do not nest). The time is O(n log n + m log m).
+    possible [1]_ (a convex bipartite graph whose intervals do not nest).
 
     Of all largest matchings this one has the first alarms: if two alarms are in the window of one event, the first
     gives the latency, and the second is a false positive.
@@ -84,19 +84,14 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
     .. [1] Glover 1967, Maximum matching in a convex bipartite graph, Naval Research Logistics Quarterly 14, 313-316.
     """
     before, after = nanoseconds(policy.window_before_s), nanoseconds(policy.window_after_s)
-    event_order, alarm_order = np.argsort(onset_ns, kind="stable"), np.argsort(alarm_ns, kind="stable")
-    raised = alarm_ns[alarm_order].tolist()
-    events, hits, place = [], [], 0
-    for event, onset in enumerate(onset_ns[event_order].tolist()):
-        while place < len(raised) and raised[place] < onset - before:
+    pairs, place = [], 0
+    for event, onset in enumerate(onset_ns.tolist()):
+        place += int(np.searchsorted(alarm_ns[place:], onset - before))
+        if place < len(alarm_ns) and alarm_ns[place] <= onset + after:
+            pairs.append((event, place))
             place += 1
-        if place == len(raised):
-            break
-        if raised[place] <= onset + after:
-            events.append(event)
-            hits.append(place)
-            place += 1
-    return event_order[events].astype(np.int64), alarm_order[hits].astype(np.int64)
+    events, hits = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return events, hits
 
 
 @dataclass(frozen=True)
@@ -202,29 +197,6 @@ def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> Fl
     event, alarm = match(onset_ns, alarm_ns, policy)
     latency[event] = (alarm_ns[alarm] - onset_ns[event]) / 1e9
     return latency
-
-
-def displacement_at_detection(
-    onset_ns: IntArray, latency_s: FloatArray, t_ns: IntArray, displacement_m: FloatArray
-) -> FloatArray:
-    """Return the (e,) displacements of the surface from the onset of each event to its alarm [m].
-
-    Parameters
-    ----------
-    onset_ns, latency_s
-        (e,) onsets of events [ns], and latencies of their alarms [s].
-    t_ns, displacement_m
-        (n,) times [ns] and relative displacement [m] of the reference, interpolated linearly.
-
-    Notes
-    -----
-    An alarm before the onset gives zero or the opposite sign. The value is NaN for a miss, and if onset or alarm is
-    outside the times of the reference, since nothing is extrapolated.
-    """
-    start = t_ns[0]
-    clock, onset = (t_ns - start) / 1e9, (onset_ns - start) / 1e9
-    moved = [np.interp(at, clock, displacement_m, left=np.nan, right=np.nan) for at in (onset, onset + latency_s)]
-    return np.asarray(moved[1] - moved[0])
 
 
 def time_base(truth: GroundTruth, policy: AlarmPolicy, t_ns: IntArray) -> tuple[IntArray, int]:

@@ -26,8 +26,8 @@ from tactbench.core.leaderboard.names import (
     metric_name,
     split_name,
 )
-from tactbench.core.leaderboard.probe import build_probe, with_leaks
-from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
+from tactbench.core.leaderboard.probe import with_leaks
+from tactbench.core.leaderboard.sentences import NO_BETTER, Board, above, below
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import installed
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
@@ -56,7 +56,7 @@ class Block:
     lines: tuple[Line, ...]
     verdict: tuple[str, ...] = ()
     """At most two sentences above the table, on the outcome of the comparison."""
-    notes: tuple[Note, ...] = ()
+    notes: tuple[str, ...] = ()
     """At most five notes below the table, on marks and numbers."""
 
 
@@ -66,7 +66,7 @@ class Table:
 
     blocks: tuple[Block, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: event detection and leakage probes."""
+    """Tables below the blocks: event detection."""
     provenance: tuple[Row, ...] = ()
     """Software versions, machine and commit of each run with rows in the table."""
 
@@ -83,15 +83,14 @@ class Table:
     @property
     def notes(self) -> tuple[str, ...]:
         """The notes of all blocks without repetitions."""
-        return tuple(dict.fromkeys(note.text for block in self.blocks for note in block.notes))
+        return tuple(dict.fromkeys(note for block in self.blocks for note in block.notes))
 
     @property
     def footer(self) -> tuple[str, ...]:
         """The provenance in sentences, for tables in files."""
         from tactbench.core.provenance.gather import foot
 
-        made_by = foot(self.provenance) if self.provenance else ()
-        return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
+        return tuple(cut(visible(sentence), LONGEST) for sentence in foot(self.provenance))
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -127,8 +126,7 @@ def build_table(
     groups = sorted(_grouped(sorted(rows, key=itemgetter("cell"))).items(), key=lambda group: _order(group[0]))
     blocks = tuple(_block(key, members, (questions or {}).get(key[0], "")) for key, members in groups)
     ordered = [line.row for block in blocks for line in block.lines]
-    sections = (events_table(ordered), build_probe(ordered))
-    return Table(blocks, tuple(section for section in sections if section is not None), tuple(provenance))
+    return Table(blocks, tuple(filter(None, [events_table(ordered)])), tuple(provenance))
 
 
 def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
@@ -166,7 +164,7 @@ def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
             *map(line_of, stopped),
         ),
         verdict=tuple(map(visible, above(board))),
-        notes=tuple(one._replace(text=visible(one.text)) for one in below(board)),
+        notes=tuple(map(visible, below(board))),
     )  # fmt: skip
 
 

@@ -65,10 +65,8 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     """Return the table to print for a block, with the columns of `view`."""
-    short = not view.wide and not view.columns
     # A note states why trivial answers were skipped.
-    shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
-    shown = shown or list(block.lines)
+    shown = [one for one in block.lines if one.kind != "skipped" or not one.row["is_baseline"]] or list(block.lines)
     texts = list(map(_texts, shown))
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in texts[0])
@@ -81,7 +79,7 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         kinds=tuple(line.kind for line in shown),
         origin=block.origin,
         summary=(block.setting, *block.verdict),
-        notes=tuple(note.text for note in block.notes),
+        notes=block.notes,
         first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )

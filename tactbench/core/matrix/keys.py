@@ -34,8 +34,7 @@ class Keys:
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result, and the key's sections; `data` has content digests by recording."""
         task = self.registry.tasks.owned(cell.task)
-        modules = [task.module, self.registry.tasks[cell.task].spec.features_by]
-        return self._of_answer(cell, data, modules, task=task.declared or cell.task)
+        return self._of_answer(cell, data, [task.module], task=task.declared or cell.task)
 
     def of_given(
         self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
@@ -45,7 +44,7 @@ class Keys:
         Raises ValueError as :func:`identity_of` does.
         """
         tasks, metric = self.registry.tasks, how["metric"]
-        modules = [task.features_by, tasks.owned(task.name).module if task.name in tasks else None]
+        modules = [tasks.owned(task.name).module if task.name in tasks else None]
         given = identity_of({**how, "metric": metric.function or metric.name})
         named = how["given"] is None
         return self._of_answer(cell, data, modules, named, task=digest_of(task.model_dump_json()), given=given)

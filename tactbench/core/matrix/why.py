@@ -33,27 +33,20 @@ class StoredCell:
     row: Row
     paths: list[Path]
 
-    def changes(self) -> tuple[str, list[str]]:
-        """Return the cell's key as of now, and sentences with the reasons why a run would not reuse its result.
-
-        The key is empty if recordings are missing. Differences from the stored key come before missing files.
-        """
+    def changes(self) -> list[str]:
+        """Return sentences with the reasons why a run would not reuse the result: differences, then missing files."""
         missing = [path for path in self.paths if not path.exists()]
-        reasons = [] if self.paths else ["there are no recordings of the cell"]
-        if missing:
-            text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
-            reasons = [f"{text}: they were never made, were removed, or have another key now"]
         try:
             digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
             before = self.store.cell(self.row).sections
             key, now = Keys(self.registry).of_cell(self.cell, digests)
         except TactbenchError as error:
-            return "", [str(error)]
-        if not reasons and self.store.finished(key) is not None:
-            return key, []
-        if missing:
-            key, before, now = "", *({**one, "data": {}} if one else {} for one in (before, now))
-        return key, [*(differences(before, now) if before else []), *reasons]
+            return [str(error)]
+        if not missing:
+            return [] if self.store.finished(key) or not before else differences(before, now)
+        text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
+        reason = f"{text}: they were never made, were removed, or have another key now"
+        return [*(differences({**before, "data": {}}, {**now, "data": {}}) if before else []), reason]
 
     def again(self, progress: Progress) -> tuple[Row, list[str], int]:
         """Compute the cell again in this process, without changing the result folder.

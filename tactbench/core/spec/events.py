@@ -70,15 +70,6 @@ class SlipThresholds(Frozen):
             raise ValueError("1 - incipient_slip_share must exceed gross_stick_ratio: incipient slip is the earlier")
         return self
 
-    def scaled(self, factor: float) -> SlipThresholds:
-        """Return thresholds with displacement, slip share and stick ratio multiplied by `factor`.
-
-        `hold_s` and `contact_force_n` are not scaled, as they decide which samples have labels.
-        """
-        names = ("gross_displacement_m", "incipient_slip_share", "gross_stick_ratio")
-        changed = {name: factor * getattr(self, name) for name in names}
-        return SlipThresholds.model_validate({**self.model_dump(), **changed})
-
 
 THRESHOLDS = SlipThresholds(
     hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05

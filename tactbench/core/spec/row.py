@@ -121,7 +121,6 @@ class Cost(_Section):
     latency_ms_p50: float | None = None
     latency_ms_p95: float | None = None
     """95th percentile; None also for fewer than 200 measured calls"""
-    latency_ms_max: float | None = None
     latency_n: int | None = None
     answer_delay_ms: float | None = None
     """sum of the parts; None also if a part other than the link is not known"""
@@ -151,8 +150,6 @@ class RestsOn(_Section):
     counts: dict[str, int] = {}
     """numbers of items left out, by reason"""
     chosen: dict[str, float] = {}
-    search: list[dict[str, Any]] = []
-    """candidates compared on validation data: parameters, k, score and fold"""
     digests: list[str] = []
     scores: dict[str, float] = {}
     """other metrics: the score on validation data, for each fold and for each class"""
@@ -163,8 +160,6 @@ class RestsOn(_Section):
     classes: list[str | bool | int | float] = []
     events: dict[str, float] = {}
     """figures of events by name; times are in the unit in the name"""
-    operating_points: list[dict[str, float]] = []
-    """the figures of `events` at other thresholds, each for another bound of false alarms in validation"""
     recordings: list[str] = []
     replicates: dict[str, Any] = {}
     """sums of the primary metric over each replicate; see replicate_sums"""

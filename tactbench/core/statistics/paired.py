@@ -1,8 +1,4 @@
-"""Compare two cells: the difference of their scores, its interval and p-value, and a verdict.
-
-The comparison is over replicates (:func:`difference`), or over folds whose training data overlap (:func:`over_folds`);
-p-values of several comparisons are corrected by :func:`holm`.
-"""
+"""Compare two cells over replicates: the difference of their scores, its interval and p-value, and a verdict."""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ from tactbench.core.evaluation.interval import influences, own_scores, student_q
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.row import TRUE, lower_is_better
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.statistics.replicates import FEWEST, counted
 
 Row = Mapping[str, Any]
@@ -89,19 +85,12 @@ class Difference:
     low: float | None
     high: float | None
     """Upper end of the 95 % interval from `low`; both None with too few replicates."""
+    verdict: Verdict
+    """Verdict on the first cell, relative to the second."""
     p: float | None
     """Two-sided p-value of no difference."""
     smallest_p: float | None
     """Smallest p-value that is possible with this number of replicates."""
-    effect: float | None
-    """Difference over the standard deviation of the replicates' differences."""
-    improved: float | None
-    """Share of replicates (if not paired, of pairs of replicates) on which the first cell is better, ties counting
-    half; None if the metric is undefined on a replicate."""
-    verdict: Verdict
-    """Verdict on the first cell, relative to the second."""
-    beyond: bool
-    """True if the whole interval is outside the region of practical equivalence."""
     replicates: int
     """Number of common replicates if they are paired; else the smaller number of the two cells."""
     unit: str
@@ -124,13 +113,12 @@ def difference(first: Row, second: Row) -> Difference:
     The verdict is *equivalent* if the interval is within the task's region of practical equivalence; otherwise *better*
     or *worse* if the interval does not contain 0, else *undecided*. Ranks follow the same rule.
     """
-    sign = -1.0 if lower_is_better(first["metric"]) else 1.0
     first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
     if len(groups) == 1 and len(groups[0].places) == 2:
-        return _paired(first, second, value, sign, groups[0])
-    return _unpaired(first, second, value, sign, groups)
+        return _paired(first, second, value, groups[0])
+    return _unpaired(first, second, value, groups)
 
 
 def _means(first: Row, second: Row) -> tuple[Row, Row]:
@@ -149,79 +137,41 @@ def _means(first: Row, second: Row) -> tuple[Row, Row]:
     return one, other
 
 
-def _paired(first: Row, second: Row, value: float, sign: float, group: PairableRows) -> Difference:
+def _paired(first: Row, second: Row, value: float, group: PairableRows) -> Difference:
     carried = group.influence[0] - group.influence[1]
-    deviation = float(np.sqrt(carried @ carried))
-    n = len(group.names)
+    n, unit = len(group.names), str(first["replicates"]["unit"])
     p, smallest = exchanged(first, second)
-    unit = str(first["replicates"]["unit"])
     over = f"paired over {counted(n, unit)}"
     if first["replicates"].get("of") == "beyond":
         over += ", of the errors beyond the floor"
-    return _difference(
-        first, value, deviation, group.freedom,
-        p=p,
-        smallest_p=smallest,
-        effect=value / (deviation * np.sqrt(n)) if deviation > 0 else None,
-        improved=_share_better(sign * (_own_scores(first) - _own_scores(second))),
-        replicates=n,
-        unit=unit,
-        paired=True,
-        method=f"{over}, Student's t ({group.freedom:.0f} degrees of freedom)",
-    )  # fmt: skip
+    method = f"{over}, Student's t ({group.freedom:.0f} degrees of freedom)"
+    ends = _ends(first, value, float(np.sqrt(carried @ carried)), group.freedom)
+    return Difference(value, *ends, p, smallest, n, unit, paired=True, method=method)
 
 
-def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[PairableRows]) -> Difference:
-    method = "Student's t (of two degrees of freedom the smaller)"
+def _unpaired(first: Row, second: Row, value: float, groups: list[PairableRows]) -> Difference:
     unit = " and ".join(dict.fromkeys(str(row["replicates"].get("unit", "none")) for row in (first, second)))
     if len(groups) < 2:
-        known: dict[str, Any] = dict.fromkeys(("p", "smallest_p", "effect", "improved"))
-        return _difference(
-            first, value, np.inf, np.inf,
-            **known, replicates=0, unit=unit, paired=False, method=f"too few replicates: an interval needs {FEWEST}",
-        )  # fmt: skip
-    one, other = sorted(groups, key=lambda group: int(group.places[0]))
-    deviation = float(np.sqrt((one.influence**2).sum() + (other.influence**2).sum()))
-    spread = float(np.sqrt(sum(len(group.names) * (group.influence**2).sum() for group in (one, other)) / 2))
-    freedom = min(one.freedom, other.freedom)
-    return _difference(
-        first, value, deviation, freedom,
-        p=two_sided_p(value / deviation, freedom) if deviation > 0 else None,
-        smallest_p=0.0 if deviation > 0 else None,
-        effect=value / spread if spread > 0 else None,
-        improved=_share_better(sign * np.subtract.outer(_own_scores(first), _own_scores(second))),
-        replicates=min(len(one.names), len(other.names)),
-        unit=unit,
-        paired=False,
-        method=f"not paired (the replicates differ), {method}",
-    )  # fmt: skip
+        method = f"too few replicates: an interval needs {FEWEST}"
+        return Difference(value, None, None, "undecided", None, None, 0, unit, paired=False, method=method)
+    deviation = float(np.sqrt(sum((group.influence**2).sum() for group in groups)))
+    freedom = min(group.freedom for group in groups)
+    p = two_sided_p(value / deviation, freedom) if deviation > 0 else None
+    method = "not paired (the replicates differ), Student's t (of two degrees of freedom the smaller)"
+    n = min(len(group.names) for group in groups)
+    ends = _ends(first, value, deviation, freedom)
+    return Difference(value, *ends, p, None if p is None else 0.0, n, unit, paired=False, method=method)
 
 
-def _difference(first: Row, value: float, deviation: float, freedom: float, **more: Any) -> Difference:
-    if not np.isfinite(deviation):
-        return Difference(value, None, None, verdict="undecided", beyond=False, **more)
+def _ends(first: Row, value: float, deviation: float, freedom: float) -> tuple[float, float, Verdict]:
+    """Return the ends of the interval of a difference with this standard error, and the verdict on the first row."""
     reach, region = float(student_quantile(freedom)) * deviation, float(first.get("equivalence") or 0.0)
     low, high = value - reach, value + reach
-    verdict: Verdict = "undecided"
     if region > 0 and -region <= low and high <= region:
-        verdict = "equivalent"
-    elif low > 0 or high < 0:
-        verdict = "better" if (value < 0) == lower_is_better(first["metric"]) else "worse"
-    return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
-
-
-def _own_scores(row: Row) -> FloatArray:
-    """Return the (replicates,) scores of a row's single replicates; NaN for a replicate with an undefined metric."""
-    kept, n_classes = row["replicates"], len(row["classes"])
-    if "scores" in kept:
-        return scores_of(kept, row["metric"])
-    metric = SUMMED[row["metric"]]
-    return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
-
-
-def _share_better(apart: FloatArray) -> float | None:
-    """Return the share of differences above 0, with zeros counted half; None if a difference is not finite."""
-    return float(np.mean((np.sign(apart) + 1) / 2)) if np.isfinite(apart).all() else None
+        return low, high, "equivalent"
+    if low <= 0 <= high:
+        return low, high, "undecided"
+    return low, high, "better" if (value < 0) == lower_is_better(first["metric"]) else "worse"
 
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
@@ -252,58 +202,6 @@ def _share(apart: FloatArray) -> float:
     """Return the share of exchanges whose absolute difference is at least that of the first, without exchange."""
     apart = np.abs(apart[np.isfinite(apart)])
     return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15))
-
-
-@dataclass(frozen=True)
-class FoldDifference:
-    """The mean difference of two cells' scores over folds, with its 95 % interval and p-value."""
-
-    mean: float
-    low: float
-    high: float
-    p: float
-    method: str
-
-
-def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDifference | None:
-    """Return the corrected resampled t-test of differences over folds; None for fewer than two folds.
-
-    `test_over_train` is the number of test rows over that of training rows, as a mean over folds.
-
-    Notes
-    -----
-    ``t = d̄ / sqrt((1/n + n_test/n_train) s²)`` with n - 1 degrees of freedom. The second term allows for the
-    correlation of folds that train on mostly the same rows; without it the test would too often find a difference
-    (Nadeau and Bengio 2003, Inference for the generalization error).
-    """
-    d = np.asarray(differences, dtype=np.float64)
-    n = len(d)
-    if n < 2:
-        return None
-    deviation = float(np.sqrt((1 / n + test_over_train) * d.var(ddof=1)))
-    mean = float(d.mean())
-    reach = float(student_quantile(n - 1)) * deviation
-    p = two_sided_p(mean / deviation, n - 1) if deviation > 0 else float(mean == 0)
-    method = f"corrected resampled t (Nadeau and Bengio) over {n} folds"
-    return FoldDifference(mean, mean - reach, mean + reach, p, method)
-
-
-def over_folds(first: Row, second: Row) -> FoldDifference | None:
-    """Return the corrected t-test of two cells over their common folds; None for fewer than two common folds.
-
-    Return None also if the replicates differ, or for errors against the true force, which folds do not have.
-    """
-    if (
-        first["metric"].startswith(TRUE)
-        or len({tuple((row.get("replicates") or {}).get("names", ())) for row in (first, second)}) > 1
-    ):
-        return None
-    sizes, other = first.get("fold_sizes") or {}, second.get("fold_sizes") or {}
-    both = [name for name in sizes if name in other and name in first["scores"] and name in second["scores"]]
-    if len(both) < 2:
-        return None
-    ratios = [sizes[name][1] / sizes[name][0] for name in both]
-    return corrected_t([first["scores"][name] - second["scores"][name] for name in both], float(np.mean(ratios)))
 
 
 def holm(p: Sequence[float | None]) -> list[float | None]:

@@ -23,7 +23,7 @@ LEVEL = 0.95
 _MEDIANS = (
     "score", "reference_score", "reference_floor", "reference_floor_se", "score_beyond_floor", "true_score",
     "sim_s", "search_s", "fit_s", "predict_s",
-    "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
+    "latency_ms_p50", "latency_ms_p95", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
 """Keys of numbers that are replaced by their median over replicates."""
 _INTERVALS = {
@@ -166,7 +166,6 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     events = [row.get("events") or {} for row in done]
     alarms: list[Any] = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
-    points_of = [row.get("operating_points") or [] for row in done]  # a detector that has a threshold has none
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
@@ -176,7 +175,6 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
         "events": _middle(events) | ({} if None in alarms else {"alarms": sum(alarms) / len(alarms)}),
-        "operating_points": [_middle(points) for points in zip(*points_of, strict=False)],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),

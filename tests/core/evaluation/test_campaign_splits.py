@@ -62,10 +62,3 @@ def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     paths = sessions(tmp_path, ("day-10", "day-9", "day-2", "both"), ROWS, role="train")
     data = load_dataset(force_task(), paths + sessions(tmp_path / "test", ("both", "last"), ROWS, role="test"))
     assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"
-
-
-def test_a_fold_says_whether_its_radius_lies_between_those_of_training(tmp_path):
-    folds = make_splits(recorded(tmp_path, "inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
-    told = {fold.name.removeprefix("cap_radius_mm ").split(", ")[0]: fold.name.split(", ")[1] for fold in folds}
-    between = dict.fromkeys(("7.5", "10.0", "20.0", "40.0"), "interpolated")
-    assert told == between | {"5.0": "extrapolated", "flat": "extrapolated"}

@@ -175,16 +175,15 @@ def test_a_fault_of_a_channel_that_the_task_does_not_look_at_is_no_finding(tmp_p
         assert len(load_dataset(task, [path]).findings) == n
 
 
-def test_clocks_that_never_meet_are_an_error_with_both_spans(tmp_path):
+def test_a_recording_whose_clocks_never_meet_is_left_out_and_named(tmp_path):
     t = np.arange(0.0, 1000.0, 10.0)
     apart, good = (
         two_streams(tmp_path / f"{name}.h5", (t, t), (t, t), (t + by, t)) for name, by in (("a", 36e5), ("b", 0))
     )
-    spans = r"slow.*0\.000.*0\.990.*fz.*3600\.000.*3600\.990"
-    with pytest.raises(DataError, match=rf"'a'.*{spans}"):
+    with pytest.raises(NotApplicable):
         load_dataset(force_task(), [apart])
     (found,) = load_dataset(force_task(), [apart, good]).findings
-    assert re.search(f"a: {spans}", found)
+    assert found.endswith(": a")
 
 
 @pytest.mark.parametrize(

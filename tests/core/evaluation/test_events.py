@@ -21,8 +21,8 @@ from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
 from tests.core.events.made import policy
 
-RATE, LATENCY, MOVED = "false alarms per minute", "onset latency p50 ms", "displacement at detection p50 mm"
-BALANCED, COMPUTE = "frame balanced accuracy", "compute s per s of signal"
+RATE, LATENCY = "false alarms per minute", "onset latency p50 ms"
+COMPUTE = "compute s per s of signal"
 REGISTRY = load_registry()
 RULES = protocol_called("deployable")
 TASK = slip.SPEC.model_copy(update={"scenes": (), "splits": ("roles", "session")})
@@ -44,7 +44,7 @@ def paths(tmp_path_factory):
 @pytest.mark.parametrize(
     "summary",
     [Summary(measure="deviation"), Summary(measure="mean-step", start=0.5),
-     Summary(measure="mean", start=0.02, end=0.06, unit="s")],
+     Summary(measure="mean", start=0.2, end=0.6)],
     ids=lambda summary: summary.name,
 )  # fmt: skip
 def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
@@ -56,7 +56,7 @@ def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
     frames = frame_times(table, TASK, untared)
     estimator = REGISTRY.estimators["frame-difference"].model_copy(update={"summaries": (summary,)})
     _, X = frame_features(TASK, untared, estimator)(table, frames)
-    begin, end = np.array([summary.start, summary.end]) * (0.1 if summary.unit == "recording" else 1.0) - 0.1
+    begin, end = 0.1 * np.array([summary.start, summary.end]) - 0.1
     for found, at_s in zip(X[::17], frames[::17] * 1e-9, strict=True):
         inside = (time_s > at_s + begin) & (time_s <= at_s + end)
         alone = replace(stream, data=stream.data[inside], time_s=time_s[inside])
@@ -87,8 +87,6 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     # The window of 0.1 s fills with louder samples after the onset, of which 10 ms (0.1 mm) pass before the label.
     # The policy asks for 20 ms of alarm more, and a frame ends every 10 ms.
     assert -10 <= events[LATENCY] <= 120
-    assert events[MOVED] == pytest.approx(events[LATENCY] * 0.01, abs=0.1)
-    assert events[BALANCED] > 0.5  # of equal thresholds the highest is taken, and loses frames
     assert (result.n_test, result.confusion, result.classes) == (9, None, [])  # three slips, six recordings
     assert any("1000 Hz" in one for one in result.remarks)
 
@@ -99,7 +97,6 @@ def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
         result = run(paths, name)
         assert result.score == 0.0
         assert result.events["misses"] == 3
-        assert result.events[BALANCED] == 0.5
         assert never_alarms(result) == (name == "slip-never")
     assert "precision" not in run(paths, "slip-never").events
 
@@ -166,10 +163,11 @@ def test_a_coefficient_of_friction_is_a_number_above_zero(tmp_path, friction):
 def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_from_the_first_frame_on():
     t_ns, some = np.arange(4) * 10, np.zeros(4)
     labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
-    reference = SlipReference(t_ns, some, some, some, {1.0: labels}, False)
+    reference = SlipReference(t_ns, some, some, labels, False)
     assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
-    scored = Scored(0, np.array([20, 25, 30]), np.array([0.0, 0.5, 0.0]), reference)
-    truth = scored.truth()
+    ends_ns = np.array([20, 25, 30])
+    truth = reference.truth(ends_ns)
+    scored = Scored(ends_ns, np.array([0.0, 0.5, 0.0]), truth, 0)
     assert EventRules(policy(), 1.0, 0.5, 5).curve([scored]).threshold.tolist() == [1.0, np.inf], "0.5 is reached"
     assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
 
@@ -177,7 +175,7 @@ def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_fro
 def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     at_once, timed = run(paths).events, run(paths, latency=True)
     parts, late = timed.delay_parts_ms, timed.events
-    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+    assert (parts["window"], parts["sampling"]) == pytest.approx((50.0, 10.0))
     spent_ms = parts["features"] + parts["prediction"]
     assert late[COMPUTE] == pytest.approx(spent_ms / 10.0)
     assert late[LATENCY] == pytest.approx(at_once[LATENCY] + spent_ms)

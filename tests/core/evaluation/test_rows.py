@@ -19,7 +19,7 @@ from sklearn.preprocessing import FunctionTransformer
 from tactbench.core.evaluation.folds import PLAIN
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.splits import OwnSplit
-from tactbench.plugin import ChannelTarget, Summary
+from tactbench.plugin import Summary
 from tactbench.tasks import slip, slip_state
 
 from . import made_slip, test_per_recording, test_vectors
@@ -59,11 +59,6 @@ def by_shots(folder):
     ]
 
 
-def scaled(seed, n):
-    X, force = ramp(seed, n)
-    return X * (1 + seed), force * (1 + seed)
-
-
 def flat(windows):
     return windows.reshape(len(windows), -1)
 
@@ -84,13 +79,8 @@ def slips(folder, spec, estimator, loud=1.3, tapped=1.3, **more):
     return TIMED(task, made_slip.campaign(folder, number=2, tapped=tapped, loud=loud), estimator, **more)
 
 
-VOTED = test_per_recording.task(summaries=(), vote="frames")
 WINDOWED = test_per_recording.task(
-    summaries=(Summary(measure="range", start=0.05, end=0.2, unit="s"), Summary(measure="change", start=0.5)),
-)  # fmt: skip
-LARGEST = force_task(
-    target=ChannelTarget(reduce="max"), answer_per="recording", summaries=(Summary(measure="mean"),),
-    splits=("session",),
+    summaries=(Summary(measure="range", start=0.125, end=0.5), Summary(measure="change", start=0.5)),
 )  # fmt: skip
 CELLS = {
     "force": lambda folder: TIMED(force_task(), presses(folder, "abcdef"), "ridge"),
@@ -109,8 +99,6 @@ CELLS = {
     "whole, shuffled": lambda folder: TIMED(
         test_per_recording.task(), test_per_recording.sequences(folder, 12), "logistic", split="shuffled"
     ),
-    "vote": lambda folder: TIMED(VOTED, test_per_recording.sequences(folder, 12), "knn"),
-    "largest": lambda folder: TIMED(LARGEST, sessions(folder, "abcdef", 60, scaled), "ols", split="session"),
     "vector": lambda folder: TIMED(
         test_vectors.place_task(), test_vectors.presses(folder, 15), "ridge", "deployable-untared", "session"
     ),

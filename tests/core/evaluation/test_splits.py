@@ -13,7 +13,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import FeatureScale, apart, causal_mean, keep, part
 from tactbench.core.evaluation.splits import Assignment, choose_split, inner_splits, make_splits
-from tactbench.plugin import ChannelTarget, Summary
+from tactbench.plugin import Summary
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
@@ -101,12 +101,10 @@ def test_a_shuffled_split_is_stamped_and_taken_unasked_only_where_nothing_else_f
     assert shuffled.stamps
     assert "leaks" in shuffled.stamps[0]
     assert not run(paths, "in-session").stamps
-    whole = force_task(
-        splits=("shuffled",), answer_per="recording", target=ChannelTarget(reduce="max"),
-        summaries=(Summary(measure="mean"),),
-    )  # fmt: skip
+    whole = label_task("session", splits=("shuffled",), answer_per="recording", summaries=(Summary(measure="mean"),))
+    one = [record(tmp_path / "one.h5", *ramp(0), labels={"session": "a"})]
     with pytest.raises(NotApplicable):
-        choose_split(whole, DEPLOYABLE, load_dataset(whole, paths[:1]), None)
+        choose_split(whole, DEPLOYABLE, load_dataset(whole, one), None)
 
 
 @pytest.mark.parametrize(("label", "folds"), [("unit", 7), ("placement", 7), ("block", 5)])

@@ -27,9 +27,10 @@ def drag():
 
 
 def labelled(factor=1.0, keep=slice(None)):
-    """Return times and labels of a part of the drag, under thresholds times `factor`."""
+    """Return times and labels of a part of the drag, with `factor` times the displacement of a slip."""
     t, displacement, pull, normal = (one[keep] for one in drag())
-    return t, slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS.scaled(factor))
+    rules = THRESHOLDS.model_copy(update={"gross_displacement_m": factor * THRESHOLDS.gross_displacement_m})
+    return t, slip_labels(seconds(*t), displacement, pull, normal, MU, rules)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])

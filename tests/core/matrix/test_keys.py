@@ -7,8 +7,7 @@ import pytest
 
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.plugins.registry import installed, load_registry
-from tactbench.core.provenance.source import source_digest
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
 
@@ -53,22 +52,6 @@ def test_other_data_or_another_order_have_another_key_and_their_names_do_not_cou
              for name in "xy"]  # fmt: skip
     assert found[0] == found[1]
     assert len(set(found[0])) == len(every)
-
-
-def test_the_code_of_a_tasks_own_features_counts(tmp_path, monkeypatch):
-    """In a package of its own: a changed feature is computed again."""
-    monkeypatch.syspath_prepend(tmp_path)
-    registry = load_registry()
-    task = registry.tasks["force"]
-    spec = task.spec.model_copy(update={"features_by": "features_of_a_stranger:crest"})
-    task = task.model_copy(update={"spec": spec})
-    monkeypatch.setattr(type(registry.tasks), "__getitem__", lambda *_: task)
-    found = []
-    for body in ("1.0", "2.0", "2.0"):
-        (tmp_path / "features_of_a_stranger.py").write_text(f"def crest(streams):\n    return {{'crest': {body}}}\n")
-        source_digest.cache_clear()
-        found.append(key(Keys(registry)))
-    assert found[0] != found[1] == found[2]
 
 
 def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):

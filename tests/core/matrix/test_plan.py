@@ -64,7 +64,7 @@ def curvature(protocol=None, split=None, probe=True):
 def test_three_more_ways_to_probe_after_those_asked_for():
     asked, probed = curvature(probe=False), curvature()
     assert probed[: len(asked)] == asked
-    expected = [("karl2016", None), ("deployable", "roles"), ("first-frame", "roles"), ("deployable", "shuffled")]
+    expected = [("karl2016", None), ("deployable", None), ("first-frame", None), ("deployable", "shuffled")]
     assert ways(probed) == ways(probed, "chance") == expected, "the trivial answers stand beside each"
     assert len({cell.name for cell in probed}) == len(probed)
 
@@ -87,8 +87,10 @@ def test_a_split_in_time_cannot_be_probed_by_itself():
         curvature("deployable", "in-session")
 
 
-@pytest.mark.parametrize(("timed", "latency_n"), [(True, 20), (False, None)])
-def test_a_row_gives_its_cell_back(timed, latency_n):
-    cell = replace(plan({"name": "force"})[0], timed=timed)
+@pytest.mark.parametrize(("timed", "latency_n", "status"), [(True, 20, "done"), (False, None, "done"),
+                                                            (True, None, "failed")])  # fmt: skip
+@pytest.mark.parametrize("split", [None, "unit"])
+def test_a_row_gives_its_cell_back(timed, latency_n, status, split):
+    cell = replace(plan({"name": "force"})[0], timed=timed, split=split)
     row = opening(cell, installed().tasks["force"].spec)
-    assert cell_of({**row, "status": "done", "latency_n": latency_n}) == cell
+    assert cell_of({**row, "split": split or "roles", "status": status, "latency_n": latency_n}) == cell

@@ -1,4 +1,4 @@
-"""Two cells compared, over replicates and over folds, and several comparisons at once."""
+"""Two cells compared over replicates, and several comparisons at once."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.statistics.paired import corrected_t, difference, holm, over_folds
+from tactbench.core.statistics.paired import difference, holm
 
 from .made import mae_row, row
 
@@ -20,8 +20,6 @@ def test_equal_sessions_of_a_mean_give_students_paired_interval_and_the_p_value_
     known = stats.ttest_rel(A, B).confidence_interval(0.95)
     assert found.value == pytest.approx((A - B).mean(), rel=1e-12)
     assert (found.low, found.high) == pytest.approx((known.low, known.high), rel=1e-9)
-    assert found.effect == pytest.approx((A - B).mean() / (A - B).std(ddof=1), rel=1e-9)
-    assert found.improved == pytest.approx(1 / 7)  # errors: the first is better in one session of seven
     known = stats.permutation_test(
         (A, B), lambda a, b, axis: np.mean(a - b, axis=axis), permutation_type="samples", vectorized=True
     )
@@ -46,37 +44,33 @@ def scored(cell, scores, **more):
 
 
 @pytest.mark.parametrize(
-    ("shift", "same", "verdict", "beyond"),
-    [
-        (0.00, None, "undecided", False), (0.30, 0.5, "equivalent", False), (0.30, 0.28, "better", False),
-        (-0.30, 0.1, "worse", True),
-    ],
-)  # fmt: skip
-def test_verdicts_follow_the_interval_and_the_region(shift, same, verdict, beyond):
+    ("shift", "same", "verdict"),
+    [(0.00, None, "undecided"), (0.30, 0.5, "equivalent"), (0.30, 0.28, "better"), (-0.30, 0.1, "worse")],
+)
+def test_verdicts_follow_the_interval_and_the_region(shift, same, verdict):
     wobble = np.array([-0.05, 0.05, -0.04, 0.04, -0.03, 0.03, 0.0])
     found = difference(mae_row("a", B, equivalence=same), mae_row("b", B + shift + wobble, equivalence=same))
-    assert (found.verdict, found.beyond) == (verdict, beyond)
+    assert found.verdict == verdict
 
 
 def test_without_replicates_nothing_is_decided():
     found = difference(mae_row("a", A, replicates={}), mae_row("b", A + 5))
-    assert (found.low, found.p, found.effect, found.verdict, found.paired) == (None, None, None, "undecided", False)
+    assert (found.low, found.p, found.verdict, found.paired) == (None, None, "undecided", False)
 
 
 def test_equal_answers_are_equivalent_only_where_a_region_is_stated():
     for same, verdict in ((None, "undecided"), (0.1, "equivalent")):
         found = difference(mae_row("a", B, equivalence=same), mae_row("b", B, equivalence=same))
         assert (found.value, found.low, found.high, found.verdict) == (0.0, 0.0, 0.0, verdict)
-        assert (found.effect, found.improved) == (None, 0.5)
     exact = np.arange(8) / 8
     for shift in (0.5, -0.5):
         found = difference(scored("a", exact, equivalence=0.5), scored("b", exact + shift, equivalence=0.5))
-        assert (found.value, found.verdict, found.beyond) == (-shift, "equivalent", False), "its edge is within it"
+        assert (found.value, found.verdict) == (-shift, "equivalent"), "its edge is within it"
 
 
 def test_replicates_that_are_all_alike_have_no_spread_to_compare_with():
     found = difference(mae_row("a", [1.0] * 7), mae_row("b", [2.0] * 7, names="tuvwxyz"))
-    assert (found.p, found.smallest_p, found.effect, found.paired) == (None, None, None, False)
+    assert (found.p, found.smallest_p, found.paired) == (None, None, False)
 
 
 @pytest.mark.parametrize("n", [7, 30])
@@ -100,32 +94,14 @@ def test_scores_of_replicates_themselves_are_exchanged_too(n):
 def test_exchanging_the_two_turns_everything_round_and_the_order_of_sessions_is_nothing(seed, replicates):
     a, b = np.random.default_rng(seed).gamma(4, 1, (2, replicates))
     one, back = difference(mae_row("a", a), mae_row("b", b)), difference(mae_row("b", b), mae_row("a", a))
-    turned = -back.value, -back.high, -back.low, -back.effect, 1 - back.improved
-    assert turned == pytest.approx((one.value, one.low, one.high, one.effect, one.improved), abs=1e-12)
+    turned = -back.value, -back.high, -back.low
+    assert turned == pytest.approx((one.value, one.low, one.high), abs=1e-12)
     assert back.verdict == {"better": "worse", "worse": "better"}.get(one.verdict, one.verdict)
     other = difference(mae_row("a", a[::-1]), mae_row("b", b[::-1]))
     if replicates <= 12:  # beyond, exchanges are drawn, and others for another order
         assert one.p == back.p == other.p
     assert other.verdict == one.verdict
     assert (other.low, other.high) == pytest.approx((one.low, one.high), abs=1e-12)
-
-
-@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 16))
-def test_the_share_of_replicates_on_which_the_first_is_better_is_of_their_own_scores(seed, replicates):
-    """Replicates are of unequal sizes, and many have no error: a perfect answer is never the worse one."""
-    rng = np.random.default_rng(seed)
-    rows = rng.integers(1, 40, replicates)
-    wrong = rng.integers(0, 2, (2, replicates)) * rng.integers(0, rows + 1, (2, replicates))
-    one, other = (
-        row(cell, np.column_stack([rows - w, w, 0 * w, 0 * w]), metric="accuracy", classes=2)
-        for cell, w in zip("ab", wrong, strict=True)
-    )
-    better, tied = wrong[0] < wrong[1], wrong[0] == wrong[1]
-    assert difference(one, other).improved == pytest.approx(np.mean(better + 0.5 * tied))
-    apart = {"replicates": other["replicates"] | {"names": [f"t{place}" for place in range(replicates)]}}
-    shares = wrong / rows
-    pairs = [1.0 if a < b else 0.5 * (a == b) for a in shares[0] for b in shares[1]]
-    assert difference(one, other | apart).improved == pytest.approx(np.mean(pairs))
 
 
 def test_classes_in_sessions_of_their_own_are_compared_within_classes():
@@ -150,26 +126,3 @@ def test_holms_own_steps():
     assert holm([0.03, 0.01, None, 0.2, 0.02]) == pytest.approx([0.06, 0.04, None, 0.2, 0.06])
     assert holm([]) == []
     assert holm([0.8, 0.9]) == [1.0, 1.0]
-
-
-def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
-    def folded(cell, scores, sizes=(80, 20)):
-        named = {f"fold {name}": value for name, value in scores.items()}
-        return mae_row(cell, [1.0] * 5, scores=named | {"mae": 9.0}, fold_sizes=dict.fromkeys(named, sizes))
-
-    one, other = folded("a", {"x": 1.0, "y": 2.0, "z": 3.0}), folded("b", {"z": 2.5, "x": 0.4, "y": 1.9})
-    found = over_folds(one, other)
-    deviation = np.sqrt((1 / 3 + 20 / 80) * np.var([0.6, 0.1, 0.5], ddof=1))  # three folds, 20 rows tested by 80
-    assert (found.mean, found.p) == pytest.approx((0.4, 2 * stats.t.sf(0.4 / deviation, 2)))
-    reach = stats.t.ppf(0.975, 2) * deviation
-    assert (found.low, found.high) == pytest.approx((found.mean - reach, found.mean + reach), rel=1e-9)
-    assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
-    twice = one | {"metric": "true_mae"}
-    assert over_folds(twice, twice) is None, "scores of folds are against the reference"
-    assert over_folds(one, other | {"replicates": other["replicates"] | {"names": list("vwxyz")}}) is None
-
-
-@pytest.mark.parametrize(("differences", "p"), [([0.0, 0.0, 0.0], 1.0), ([0.5, 0.5, 0.5], 0.0)])
-def test_folds_that_differ_by_the_same_leave_no_doubt(differences, p):
-    found = corrected_t(differences, 0.25)
-    assert (found.mean, found.low, found.high, found.p) == (*[differences[0]] * 3, p)

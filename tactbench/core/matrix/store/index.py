@@ -18,7 +18,7 @@ from tactbench.core.files import utf8_json
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.spec.row import FORMAT
 
-VERSION = 3
+VERSION = 4
 _LOCKED_S = 10.0
 """Time limit for waiting for another process that writes the index [s]."""
 _TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
@@ -36,7 +36,6 @@ CREATE INDEX IF NOT EXISTS names ON cells (cell, ended_ns);
 CREATE INDEX IF NOT EXISTS keys ON cells (key);
 CREATE VIEW IF NOT EXISTS latest AS SELECT * FROM cells AS one WHERE NOT EXISTS (
   SELECT 1 FROM cells AS other WHERE other.cell = one.cell AND other.ended_ns > one.ended_ns);
-CREATE TABLE IF NOT EXISTS provenance (id TEXT PRIMARY KEY, text TEXT);
 CREATE TABLE IF NOT EXISTS recordings (
   path TEXT PRIMARY KEY, size INTEGER, modified_ns INTEGER, digest TEXT, sensor TEXT, scene TEXT);
 PRAGMA user_version = {VERSION};
@@ -62,10 +61,10 @@ class Index:
         found = self._all("SELECT row FROM cells WHERE key = ? AND status = 'done'", key)
         return json.loads(found[0][0]) if found else None
 
-    def provenance(self, name: str) -> dict[str, Any]:
+    def provenance(self, name: str) -> Mapping[str, Any]:
         """Return the provenance (software and machine) with the id in ``row["made_by"]``; empty if unknown."""
-        found = self._all("SELECT text FROM provenance WHERE id = ?", name)
-        return json.loads(found[0][0]) if found else {}
+        found = self._all("SELECT file FROM cells WHERE made_by = ?", name)
+        return read_cell(self.folder / "cells" / found[0][0], answers=False).provenance if found else {}
 
     def about(self, recording: Path) -> Mapping[str, Any]:
         """Return the content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
@@ -90,7 +89,6 @@ class Index:
         row = cell.row
         facts = (path.name, *signature(path), cell.ended_ns, *map(row.get, COLUMNS), json.dumps(row))
         self._all(f"REPLACE INTO cells VALUES ({', '.join('?' * len(facts))})", *facts)
-        self._all("INSERT OR IGNORE INTO provenance VALUES (?, ?)", row.get("made_by", ""), json.dumps(cell.provenance))
 
     def _drop(self, name: str) -> None:
         """Remove the index entry of a file."""

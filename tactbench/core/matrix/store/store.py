@@ -68,7 +68,7 @@ class Store(Index):
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Set the provenance of all cells written from now on, and return its id."""
-        self._made_by = digest_of(json.dumps(provenance, sort_keys=True))[:16], provenance
+        self._made_by = digest_of(json.dumps(provenance, sort_keys=True)), provenance
         return self._made_by[0]
 
     def keep(
