@@ -66,7 +66,7 @@ def check(file: RigFile) -> RigCheck:
         CheckTable("axes", ("axis", "stands", "largest force", "by", "units that are ASSUMED"), tuple(axes)),
         CheckTable("largest forces, and the force loop", ("what", "value"), tuple(forces)),
     )
-    return RigCheck(tables, tuple(problems))
+    return RigCheck(tables, tuple(problems), file, settings.limits.travel_ceiling_n)
 
 
 def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
