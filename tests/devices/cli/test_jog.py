@@ -1,5 +1,6 @@
 """One axis by small steps: halted by the force, let back, and refused what is not known to be safe."""
 
+import click
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from tactbench.devices.cli.jog import move_by_steps
 from tactbench.devices.emulation.line import split_faults
 from tactbench.plugin import load_object, load_registry
 from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices, EmulatorSettings
+from tests.conftest import ROOT, Verbs
 
 ENTRY = ForceEntry(device="net-ft", link="emulated", zero_s=0.1)
 CEILING_N, SKIN_M, N_M = 0.5, -2.5e-3, 2e3
@@ -77,3 +79,12 @@ def test_what_is_not_confirmed_too_long_or_no_number_moves_nothing(answers):
 def test_an_axis_does_not_move_on_without_a_force():
     with pytest.raises(LinkUnplugged):
         steps("yes", *["+"] * 20, faults=("unplug:start_s=3",))
+
+
+def test_the_verb_opens_an_emulated_axis_of_a_rig_file(tmp_path, monkeypatch):
+    answers, example = iter(["yes", "+", ""]), str(ROOT / "examples" / "rigs" / "emulated.yaml")
+    monkeypatch.setattr(click, "prompt", lambda text, **_: next(answers))
+    doctor = Verbs(tmp_path, here=True)
+    doctor("doctor", "--rig-file", example, "--jog", "motor")
+    assert list(answers) == []
+    doctor("doctor", "--rig-file", example, "--jog", "joint-9", code=2)
