@@ -27,14 +27,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
 
-from tactbench.core.errors import (
-    LinkClosed,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    RigError,
-    TactbenchError,
-)
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, RigError, TactbenchError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, fault_text
