@@ -145,10 +145,7 @@ def serve(
     physics = physics_of(file, registry)
     where = registry.rigs[file.rig].emulators
     emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control,
-        RealTimeDevices(emulators.devices) as emulated,
-    ):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control, RealTimeDevices(emulators.devices) as emulated:
         control.bind(("127.0.0.1", 0))
         control.settimeout(LISTEN_S)
         started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
