@@ -29,7 +29,7 @@ def test_a_table_with_a_clock_a_unit_and_a_sentinel(tables, name, cells, lines):
     assert (force.quality[1::2] == Quality.MISSING).all()
     np.testing.assert_allclose(force.data[::2, 0], np.arange(0, 40, 2) * 9.80665e-3, rtol=1e-15)  # one multiplication
     assert sorted(meta.counts.values()) == [20, 40, 40]
-    assert (meta.simulated, meta.clock, meta.origin) == (False, "host", "press.csv")
+    assert (meta.simulated, meta.clock, meta.origin, meta.remarks) == (False, "host", "press.csv", ())
 
 
 def test_times_since_1970_keep_every_digit(tables):
@@ -37,6 +37,16 @@ def test_times_since_1970_keep_every_digit(tables):
     tables.put("press.csv", "1743486221.590758001,1,2,3,4\n1743486221.590758002,1,2,3,5\n")
     _, streams = read(tables.run(tables__table__time__epoch="unix"))
     assert streams["taxels"].t_ns.tolist() == [1743486221590758001, 1743486221590758002]
+
+
+@pytest.mark.parametrize(("stamp", "year"), [("31535999.9", "1970"), ("7258118400.1", "2200")])
+def test_times_since_1970_are_of_1971_to_2199(tables, stamp, year):
+    """Other times are in another unit, or of a clock that begins at 0."""
+    since_1970 = {"tables__table__time__epoch": "unix"}
+    tables.put("press.csv", f"31536000,1,2,3,4\n{stamp},1,2,3,5\n")
+    tables.refused("press.csv:2", year, **since_1970)
+    tables.put("press.csv", "31536000,1,2,3,4\n7258118400,1,2,3,5\n")
+    assert tables.run(**since_1970).rows == 2
 
 
 def test_columns_by_name_ranges_and_combinations(tables):
@@ -56,7 +66,9 @@ def test_columns_by_name_ranges_and_combinations(tables):
               object: {column: object}
               slipped: {column: slipped, values: {0: stable, 1: slipped}}
     """)
-    taxels = read(report)[1]["taxels"]
+    meta, streams = read(report)
+    taxels = streams["taxels"]
+    assert (len(meta.remarks), meta.remarks[0][:8]) == (1, "No clock")
     assert [channel.name for channel in taxels.spec.channels] == ["ff.1", "ff.2", "th.1", "th.2"]
     assert {(one.sign, one.lower, one.upper, one.rest) for one in taxels.spec.channels} == {(0, None, None, None)}
     assert taxels.data.tolist() == [[1, 2, 3, 4], [5, 6, 7, 8]]
