@@ -7,6 +7,7 @@ from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import ClockSegment, StreamClock, StreamCounts
+from tests.core.evaluation.made import FORCE
 
 N = 200
 READINGS = np.random.default_rng(0).integers(100, 4000, (N, 3))
@@ -42,6 +43,7 @@ def clocked(drift, breaks=0):
     return {"clocks": {"taxels": StreamClock(source="device", segments=(line,), breaks=breaks)}}
 
 
+LIMITED = FORCE.model_copy(update={"channels": (FORCE.channels[0].model_copy(update={"lower": 0.0, "upper": 20.0}),)})
 LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
 
 
@@ -56,6 +58,7 @@ LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
         (flagged(Quality.GAP, [20, 90], slice(None)), {"rows-before-lost": f"2 of {N} rows"}),
         (flagged(Quality.SUSPECT, 3, 0), {"suspect": "1 samples"}),
         (flagged(Quality.SATURATED, 20, 1, changed(1, slice(7), 4095)), {"saturated": f"8 of {N}"}),
+        ({"force": np.minimum(np.arange(N), 20), "reference": (LIMITED,)}, {"saturated": f"180 of {N}"}),
         (late(150, 700_000_000), {"gaps": "0.71 s"}),
         ({"t_ns": JITTER}, {}),
         ({"t_ns": late(100, -50_000_000)["t_ns"] - 10_000_000 * (np.arange(N) >= 50)},
