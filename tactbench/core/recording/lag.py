@@ -202,7 +202,7 @@ def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
 def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
     """Return the shortest of the best lags up to `most` rows, and the factor by which it reduces squared residuals.
 
-    If the force repeats itself, several lags are equally good.
+    If the force repeats itself, several lags are equally good. The factor is 0 if the search ends at `most` rows.
     """
     curve = _curve(f)[:, 2:]
     base = np.linalg.qr(curve - curve.mean(axis=0))[0]
@@ -215,9 +215,8 @@ def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
     place = int(good[np.argmin(abs(lags[good]))])
     while 0 < place < 2 * most and min(left[place - 1], left[place + 1]) < left[place]:
         place += -1 if left[place - 1] < left[place + 1] else 1
-    if place in (0, most, 2 * most):
-        return 0, 0.0
-    return int(lags[place]), float(left[most] / max(left[place], 1e-12))
+    inside = 0 < place < 2 * most
+    return int(lags[place]), inside * float(left[most] / max(left[place], 1e-12))
 
 
 def _curve(f: FloatArray) -> FloatArray:

@@ -104,7 +104,10 @@ def test_a_recording_is_searched_whole_or_at_both_ends_if_it_is_long():
     assert windows(tenths, tenths) == ends
     fast = np.arange(6002) * 10**7
     assert windows(fast[:-1], fast) == {"": (0, 60 * 10**9)}
-    assert windows(fast, fast) == {" at the beginning": (0, 30 * 10**9), " at the end": (30_010_000_000, 60_010_000_000)}
+    assert windows(fast, fast) == {
+        " at the beginning": (0, 30 * 10**9),
+        " at the end": (30_010_000_000, 60_010_000_000),
+    }
 
 
 @pytest.mark.parametrize(
