@@ -179,16 +179,16 @@ def _kind(source: TableSource) -> str:
 def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
     """Yield a finding for each number that seems to be no reading, in the (n, channels) numbers of a table.
 
-    Such numbers are set to NaN in `given`, so that the search for further ones ignores them.
+    Such numbers, and channels whose numbers lost their sign, are set to NaN in `given`, so that the search for further
+    ones ignores them.
     """
     found: dict[str, dict[int, int]] = {}
     low, high = np.fmin.reduce(given), np.fmax.reduce(given)
-    sound = np.ones(given.shape[1], dtype=bool)
     for period in (2**bits for bits in UNSIGNED_BITS):
         for place in np.flatnonzero((low >= 0) & (low < 0.1 * period) & (high > 0.9 * period) & (high < period)):
             jumps = _jumps(given[:, place], period)
             if jumps:
-                sound[place] = False
+                given[:, place] = np.nan
                 text = f"jumps between 0 and {period} in {{:g}} % of the rows, as if negative numbers lost their sign"
                 found.setdefault(text, {})[int(place)] = jumps
     rows = np.isfinite(given).sum(axis=0)
@@ -199,7 +199,7 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
         first, last = np.fmin.reduce(others), np.fmax.reduce(others)
         off = np.minimum(np.abs(extreme - first), np.abs(extreme - last)) / np.maximum(last - first, 1e-300)
         count = at.sum(axis=0)
-        places = np.flatnonzero(sound & (2 * count <= rows) & ((count > 2) | (off > OUTSIDE)))
+        places = np.flatnonzero((2 * count <= rows) & ((count > 2) | (off > OUTSIDE)))
         candidates += [(float(off[place]), int(place), float(extreme[place])) for place in places]
     for far, channel, value in sorted(candidates, reverse=True):
         if _is_apart(given[:, channel], value, far):

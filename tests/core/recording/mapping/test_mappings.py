@@ -315,6 +315,7 @@ def unsigned(values):
         (np.where(ROWS % 100 < 10, -1, PRESSES + 5), "`sentinels: [-1]`"),
         (np.where(ROWS % 500 == 250, -9999, PRESSES), "`sentinels: [-9999]`"),
         (unsigned(400 * PRESSES - 40 + ROWS % 90), "65536"),
+        (unsigned(np.random.default_rng(2).normal(6, 4, 600)), "65536"),
         (PRESSES, ""),
         (np.minimum(PRESSES, 6), ""),
         (np.full(600, 7), ""),
