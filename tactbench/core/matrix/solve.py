@@ -55,12 +55,12 @@ def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
         return
     _prepared.add((os.getpid(), estimator.name, kind))
     with suppress(Exception):
-        build = load_object(estimator.where)
-        build(kind=kind, seed=0, threads=1, **estimator.params)
+        params = {**estimator.params, **(estimator.rehearsal or {})}
+        made = load_object(estimator.where)(kind=kind, seed=0, threads=1, **params)
         if estimator.rehearsal is not None:
             from tactbench.core.evaluation.warm_up import rehearse
 
-            rehearse(build(kind=kind, seed=0, threads=1, **{**estimator.params, **estimator.rehearsal}), kind)
+            rehearse(made, kind)
 
 
 _prepared: set[tuple[int, str, str]] = set()
