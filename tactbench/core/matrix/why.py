@@ -106,7 +106,7 @@ def meant(given: str, names: Sequence[str]) -> str:
     if given in names:
         return given
     parts = "/(.*/)?".join(map(re.escape, given.split("/")))
-    patterns = rf"{re.escape(given)}/\d+$", f"(^|/){parts}(/|$)", re.escape(given)
+    patterns = f"(^|/){parts}(/|$)", re.escape(given)
     found = next(filter(None, ([one for one in names if re.search(pattern, one)] for pattern in patterns)), [])
     if len({_replicate(name)[0] for name in found}) == 1:
         return min(found, key=_replicate)

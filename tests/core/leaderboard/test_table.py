@@ -95,7 +95,7 @@ def test_a_trivial_answer_that_was_skipped_stands_in_the_note_alone():
     rows = [row(), row(estimator="time-index", is_baseline=True, **ended), row("b", **ended)]
     table = build_table(rows)
     assert [[line[1] for line in grid.lines] for grid in grids(table)] == [["a", "b"]]
-    assert any("a/time-index, b/lasso" in note and "Why." in note for note in table.notes)
+    assert any("a/time-index, b/lasso" in note and "Why." in note for note in table.blocks[0].notes)
     assert len(grids(build_table(rows[1:2]))[0].lines) == 1
 
 
