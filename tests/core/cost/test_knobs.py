@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import measure, quick_estimator, settings_of
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
 from tactbench.core.cost.precision import precise
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
@@ -132,6 +132,21 @@ def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, regis
     assert "window k" not in knobs
     with pytest.raises(NotApplicable, match="single samples"):
         load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+
+
+def test_settings_are_the_defaults_and_values_on_either_side(registry):
+    force, forest = registry.tasks["force"].spec, registry.estimators["forest"]
+    values = {}
+    for one in [
+        *settings_of(force, [forest], "deployable"),
+        *simulations_of(registry.rigs["twin"], forest, "karl2016"),
+    ]:
+        values.setdefault(one.knob, []).append(one.value)
+    assert values == {
+        "trees": ["3", "10", "30", "100", "300", "500"], "window k": ["0", "2", "5", "10", "20", "40"],
+        "every n-th sample": ["1", "2", "5", "10", "20"], "training sessions": ["1", "2", "5", "10"],
+        "estimator": ["forest"], "rung": list(registry.rigs["twin"].rungs[:-1]), "tolerance": ["3", "1", "0.3"],
+    }  # fmt: skip
 
 
 def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
