@@ -60,18 +60,14 @@ class StoredCell:
             if self.registry.rigs[self.cell.rig].simulated:
                 requests = requests_for([self.cell], self.registry, keys, again)[need]
                 source = RecordingSource([request.path for request in requests], requests)
-            choice = EngineChoice("in-process")
-            run = Run(again, self.registry, keys, {need: source}, choice, None, progress)
+            run = Run(again, self.registry, keys, {need: source}, EngineChoice("in-process"), None, progress)
             run.carry_out([self.cell], timed=True)
             row = run.rows[self.cell.name]
             done = row["status"] == self.row["status"] == "done"
-            old, new = (
-                {name: one[name] for name in (SEED_DECIDES if done else ("status", "reason"))}
-                for one in (self.row, row)
-            )
-            if done:
-                for facts, kept in ((old, self.store.cell(self.row)), (new, again.cell(row))):
-                    facts |= {"recording": kept.sections["data"], "answers": kept.digests}
+            compared = SEED_DECIDES if done else ("status", "reason")
+            old, new = ({name: one[name] for name in compared} for one in (self.row, row))
+            for facts, kept in ((old, self.store.cell(self.row)), (new, again.cell(row))) if done else ():
+                facts |= {"recording": kept.sections["data"], "answers": kept.digests}
         return row, differences(old, new), run.recorded
 
 

@@ -120,7 +120,8 @@ def test_names_and_the_values_that_columns_are_sorted_by():
     (line,) = build_table([row(answer_delay_ms=2.0, sim_s=3.0, score_min=0.4, **ends)]).lines
     values = {name: text.value for name, text in line.texts.items() if isinstance(text, Entry)}
     assert values == pytest.approx({
-        "place": 1, "score": 0.5, "interval": 0.4, "beyond floor": 0.2, "interval beyond floor": 0.125, "test samples": 4400.0,
+        "place": 1, "score": 0.5, "interval": 0.4, "beyond floor": 0.2, "interval beyond floor": 0.125,
+        "test samples": 4400.0,
         "delay after touch": 2e-3, "training": 0.5, "simulation": 3.0, "latency p50": 2e-5, "latency p95": 3e-5,
     })  # fmt: skip
     assert (line.texts["score"].cell, line.texts["range"]) == (line.row["cell"], "")
