@@ -32,7 +32,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
 from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text_table import TextTable, field_text
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.store import Store
@@ -79,10 +79,8 @@ class Table:
 
     @property
     def footer(self) -> tuple[str, ...]:
-        """The provenance in sentences, for tables in files."""
-        from tactbench.core.provenance.gather import foot
-
-        return tuple(map(visible, foot(self.provenance)))
+        """The provenance as text, for tables in files."""
+        return tuple(visible(f"Made with {field_text(one)}.") for one in self.provenance)
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError, did_you_mean
+from tactbench.core.files import named_file
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.plan import Cell, cell_of
@@ -44,7 +45,7 @@ class StoredCell:
             return [str(error)]
         if not missing:
             return [] if self.store.finished(key) or not before else differences(before, now)
-        text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
+        text = f"{len(missing)} of {len(self.paths)} recordings are missing, {missing[0].stem} first"
         reason = f"{text}: they were never made, were removed, or have another key now"
         return [*(differences({**before, "data": {}}, {**now, "data": {}}) if before else []), reason]
 
@@ -72,18 +73,15 @@ class StoredCell:
 
 
 def stored_cell(store: Store, given: str) -> StoredCell:
-    """Return the stored cell whose name contains `given`, see `meant`; raises UsageError if a recording is missing."""
+    """Return the stored cell whose name contains `given`, see `meant`."""
     rows = {row["cell"]: row for row in store.rows()}
     row = rows[meant(given, list(rows))]
     registry, cell = with_declared_of(installed(), [row]), cell_of(row)
+    paths = [store.folder / named_file(path) for path in row["recordings"]]
     if registry.rigs[cell.rig].simulated:
         requests = requests_for([cell], registry, Keys(registry), store)[request_key(cell)]
-        return StoredCell(store, registry, cell, row, [request.path for request in requests])
-    for path, file in store.recordings(row):
-        if file is None:
-            hint = "Run the matrix again with --rig replay --recordings DIR."
-            raise UsageError(f"The recording {path} does not exist.", hint=hint)
-    return StoredCell(store, registry, cell, row, [file for _, file in store.recordings(row) if file is not None])
+        paths = [request.path for request in requests]
+    return StoredCell(store, registry, cell, row, paths)
 
 
 def meant(given: str, names: Sequence[str]) -> str:
