@@ -27,7 +27,7 @@ from sklearn.ensemble import RandomForestClassifier
 from sklearn.metrics import f1_score
 from threadpoolctl import threadpool_limits
 
-from tactbench.core.evaluation.delay import single_row_latency_s
+from tactbench.core.evaluation.delay import calls_s
 from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.matrix.run import run_matrix
@@ -61,7 +61,7 @@ class Forest:
         model.predict(self.X_test)
         self.fit_s.append(fitted - began)
         self.batch_s.append(time.perf_counter() - fitted)
-        self.latency_s.extend(single_row_latency_s(model, self.X_test, time.perf_counter))
+        self.latency_s.extend(calls_s(self.X_test[:, None], model.predict, time.perf_counter))
 
     def f1(self) -> float:
         """Return the macro F1 on the test rows."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
 from tactbench.core.evaluation.dataset import Table
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
+from tactbench.core.evaluation.sets import FeatureScale, causal_mean
 from tactbench.core.evaluation.summaries import (
     frame_features,
     frame_times,
@@ -26,7 +26,6 @@ from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.core.spec.task import TaskSpec
 
-T = TypeVar("T")
 Clock = Callable[[], float]
 """Function that returns the time in seconds, which never decreases."""
 
@@ -81,7 +80,7 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
         elif rules.first_row_only or (k == 0 and task.answer_per == "sample"):
             windows.append(0.0)
         elif task.answer_per == "recording":
-            windows.append(_span_s(table, task, rules, row_s))
+            windows.append(_span_s(table, task, rules))
         else:
             windows.append(None if row_s is None else row_s * k / 2)
     longest = {"sampling": _largest(sampling), "link": _largest(links), "window": _largest(windows)}
@@ -137,19 +136,12 @@ def _largest(values: Sequence[float | None]) -> float | None:
     return max(known) if len(known) == len(values) else None
 
 
-def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec, row_s: float | None) -> float | None:
-    """Return the time span [s] of the samples used for the answer to a recording; None if it is unknown."""
-    if task.vote:
-        times_s = table.time_s[asked_for(table, rules)]
-        if table.meta.clock == "none":
-            return None if row_s is None else len(times_s) * row_s
-        return float(np.ptp(times_s)) if len(times_s) else 0.0
+def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    """Return the time span [s] of the windows of a recording's summaries; None if it is unknown."""
     length = _largest([_length_s(stream) for stream in kept(table, rules)])
     if length is None:
         return None
-    scales = [1.0 if one.unit == "s" else length for one in task.summaries]
-    ends = [(one.start * scale, one.end * scale) for one, scale in zip(task.summaries, scales, strict=True)]
-    return max(end for _, end in ends) - min(start for start, _ in ends)
+    return length * (max(one.end for one in task.summaries) - min(one.start for one in task.summaries))
 
 
 def _length_s(stream: StreamReadings) -> float | None:
@@ -178,34 +170,30 @@ def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k:
         return None
     if is_summarised(task, rules):
         work = recording_features(task, rules)
-        return float(np.median(calls_s(len(tables), tables.__getitem__, work, clock, AT_LEAST)))
+        return float(np.median(calls_s(tables, work, clock, AT_LEAST)))
     rest, scale = np.zeros(X.shape[-1]), FeatureScale(np.zeros(X.shape[-1]), np.ones(X.shape[-1]))
-    segment = np.zeros(k + 1, dtype=np.int64)
+    readings, segment = np.resize(X, (k + 1, *X.shape[1:])), np.zeros(k + 1, dtype=np.int64)
 
     def ready(readings: FloatArray) -> FloatArray:
-        return causal_mean(scale(readings - rest if rules.tare else readings), k, segment[: len(readings)])[-1:]
+        return causal_mean(scale(readings - rest if rules.tare else readings), k, segment)[-1:]
 
     # Rows stand for raw readings: values change no time. A median needs no more calls than the fewest.
-    return float(np.median(calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, AT_LEAST)))
+    return float(np.median(calls_s([readings], ready, clock, AT_LEAST)))
 
 
 def calls_s(
-    rows: int,
-    given: Callable[[int], T],
-    work: Callable[[T], object],
-    clock: Clock,
-    at_most: int = AT_MOST,
+    given: Sequence[Any] | FloatArray, work: Callable[[Any], object], clock: Clock, at_most: int = AT_MOST
 ) -> FloatArray:
-    """Return the (calls,) durations [s] of ``work(given(i))``, for row numbers i spread over `rows` rows.
+    """Return the (calls,) durations [s] of ``work`` called with items of a sequence.
 
-    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Rows are
-    spread because a model may answer some rows faster than others.
+    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Items are
+    spread over the sequence because a model may answer some rows faster than others.
     """
-    places = np.linspace(0, rows - 1, at_most).astype(int)
-    work(given(places[0]))  # the first call of a library takes longer
+    places = np.linspace(0, len(given) - 1, at_most).astype(int)
+    work(given[places[0]])  # the first call of a library takes longer
     spent: list[float] = []
     for place in np.random.default_rng(0).permutation(places):
-        row = given(place)
+        row = given[place]
         began = clock()
         work(row)
         spent.append(clock() - began)

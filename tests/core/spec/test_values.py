@@ -40,7 +40,7 @@ REGISTRY = load_registry()
 FORCE = REGISTRY.tasks["force"].spec
 WHY = Source(tag="assumed", reference="a test")
 FRAMES = SlipTarget(hop_s=0.01, window_s=0.1)
-MEAN, VOTE = (Summary(measure="mean"),), {"vote": "frames", "answer_per": "recording", "splits": ()}
+MEAN = (Summary(measure="mean"),)
 LABEL = {"kind": "classification", "metric": "macro_f1", "target": LabelTarget(name="a"), "unit": "1"}
 
 
@@ -64,13 +64,9 @@ def from_frames(**more):
         (Parameter(default=1, unit="mm", text="t", least=0.5).range, "0.5 mm or more"),
         (Parameter(default=1, unit="1", text="t", most=3).range, "0 to 3"),
         (MEAN[0].name, "mean"),
-        (Summary(measure="mean", end=2, unit="s").name, "mean 0-2 s"),
         (Summary(measure="mean", end=0.5, kinds=("taxel",)).name, "mean 0-0.5 of the recording of taxel"),
         (Summary(measure="band-energy", band_hz=(5, 20)).name, "band-energy 5-20 Hz"),
         (force_task().answer_from, ""),
-        (force_task(**LABEL, **VOTE).answer_from, "the commonest answer of its frames"),
-        (force_task(**LABEL | {"kind": "regression", "metric": "rmse"}, **VOTE).answer_from,
-         "the mean answer of its frames"),
         (force_task(**LABEL, answer_per="recording", splits=(), summaries=MEAN).answer_from, "mean"),
         (from_frames(splits=()).answer_from, str(FRAMES)),
         (plural("session"), "sessions"),
