@@ -182,10 +182,9 @@ class _Child:
             try:
                 if self._connection.poll(POLL_S):
                     kind, value, log = self._connection.recv()
-                    if kind == "begun":
-                        began_s, shared_mb = time.monotonic(), value
-                        continue
-                    return _with_log(value, log, began_s)
+                    if kind == "ended":
+                        return _with_log(value, log, began_s)
+                    began_s, shared_mb = time.monotonic(), value
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
             except (EOFError, OSError):  # it has ended, or closed the connection
                 self._process.join(1.0)

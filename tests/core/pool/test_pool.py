@@ -54,6 +54,7 @@ def together(*whats, limits=PATIENT):
     [
         ("raises", Raised, "ValueError", None),
         ("exits", Raised, "SystemExit", None),
+        ("runs_out", OutOfMemory, "Memory ran out", None),
         ("refuses", NotApplicable, "another", None),
         ("aborts", Crashed, "SIGABRT", 6),
         ("terminates", Crashed, "SIGKILL", 9),
