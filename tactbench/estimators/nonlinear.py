@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import Estimator, FloatArray, NotApplicable
+from tactbench.plugin import Estimator, FloatArray
 
 
 class Wrapped:
@@ -63,58 +62,6 @@ def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
 
     make = ExtraTreesClassifier if kind == "classification" else ExtraTreesRegressor
     return Forest(make(random_state=seed, **params), threads)
-
-
-class FastForest(Wrapped):
-    """A forest that raises an error when scikit-learn-intelex falls back to plain scikit-learn.
-
-    The library falls back silently for parameters that oneDAL does not support (more than 6024 trees, some criteria
-    and weights). The benchmark would then state the plain forest's results under the wrong name.
-    """
-
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> FastForest:
-        """Grow the trees on X (n, p) and y (n,).
-
-        Raises
-        ------
-        NotApplicable
-            If oneDAL did not grow the trees.
-        """
-        # daal4py compares versions with distutils: nothing a user could do, and nothing about the data.
-        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-            self.model.fit(X, y)
-        if not hasattr(self.model, "_onedal_estimator"):
-            raise NotApplicable(
-                f"scikit-learn-intelex does not accelerate a forest with these parameters "
-                f"(n_estimators={self.model.n_estimators}): it fell back to plain scikit-learn.",
-                hint="Use the estimator `forest`.",
-            )
-        return self
-
-    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return the (n,) predictions for the features X (n, p)."""
-        return super().predict(X).reshape(len(X))
-
-
-def fast_forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
-    """Return a random forest computed by oneDAL through scikit-learn-intelex.
-
-    oneDAL sorts features into 256 bins and draws other random numbers, so that its trees differ from scikit-learn's.
-
-    Raises
-    ------
-    NotApplicable
-        If scikit-learn-intelex is not installed.
-    """
-    try:
-        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-            from sklearnex.ensemble import RandomForestClassifier, RandomForestRegressor
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != "sklearnex":
-            raise  # it is there, and broken
-        raise NotApplicable("needs scikit-learn-intelex: pip install 'tactbench[fast]' (x86-64 only)") from error
-    make = RandomForestClassifier if kind == "classification" else RandomForestRegressor
-    return FastForest(make(random_state=seed, n_jobs=threads, **params))
 
 
 def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:

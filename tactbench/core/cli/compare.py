@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
+from tactbench.core.cli.grid import print_records, print_tables
 from tactbench.core.cli.options import RESULTS, format_option
+from tactbench.core.leaderboard.pairwise import (
+    comparisons,
+    folder_comparisons,
+    record_of,
+    tables_of,
+)
+from tactbench.core.study.results import is_results, opened, shown_rows
 
 
 @click.command(name="compare")
@@ -20,15 +28,6 @@ def command(first: str, second: str, out: Path, task: str | None, shape: str) ->
 
     With two folders, cells of the same name are compared: before and after a change, or of two laboratories.
     """
-    from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.leaderboard.pairwise import (
-        comparisons,
-        folder_comparisons,
-        record_of,
-        tables_of,
-    )
-    from tactbench.core.study.results import is_results, opened, shown_rows
-
     if all(is_results(Path(one)) for one in (first, second)):
         before, after = (shown_rows(opened(Path(one))) for one in (first, second))
         found = folder_comparisons(before, after, first, second, task)

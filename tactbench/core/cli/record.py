@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import time
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.acquisition import acquire
+from tactbench.core.cli.live import LiveView
 from tactbench.core.cli.options import SIMULATION, YES
+from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.plugins.interfaces import Operator, RecordingRequest, Rig
+from tactbench.core.plugins.registry import Registry, load_registry
+from tactbench.core.plugins.rigs import load_rig_file, rig_of
+from tactbench.core.provenance.gather import gather
+from tactbench.core.recording.image import require_free
+from tactbench.core.recording.reader import read_meta
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.study.operator import TerminalOperator
+from tactbench.core.study.scenes import scene_of
+from tactbench.core.study.simulation import simulation_of
+from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.interfaces import Operator, Rig
-    from tactbench.core.plugins.registry import Registry
-    from tactbench.core.spec.rig_file import RigFile
 
 
 @click.command(name="record")
@@ -29,29 +39,12 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
-@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
+@click.option("--live", is_flag=True, help="Show force, planned force and rates while recording.")
 def command(
     sensor: str, rig: str | None, rig_file: str | None, indenter: str | None, profile: str | None, effects: str | None,
     settings: tuple[str, ...], seed: int, out: Path, yes: bool, live: bool,
 ) -> None:  # fmt: skip
     """Record one scene into one file; `tactbench list` names indenters and profiles."""
-    import time
-    from contextlib import ExitStack, nullcontext
-
-    from tactbench.core.acquisition import acquire
-    from tactbench.core.cli.live import LiveView
-    from tactbench.core.errors import TactbenchError
-    from tactbench.core.plugins.interfaces import RecordingRequest
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rigs import load_rig_file
-    from tactbench.core.provenance.gather import gather
-    from tactbench.core.recording.image import require_free
-    from tactbench.core.recording.reader import read_meta
-    from tactbench.core.study.operator import TerminalOperator
-    from tactbench.core.study.scenes import scene_of
-    from tactbench.core.study.simulation import simulation_of
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = scene_of(registry, descriptor, indenter, profile)
@@ -91,8 +84,6 @@ def command(
 
 
 def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.rigs import rig_of
 
     # With a folder a rig that replays can be built too, and be refused by its name.
     rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import print_records
 from tactbench.core.cli.options import EFFECTS, format_option
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Row
-    from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
+from tactbench.core.cost.knobs import task_score
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard.names import grouped
+from tactbench.core.matrix.store import Row
+from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.plugins.rigs import rig_context
+from tactbench.core.study.progress import progress
+from tactbench.core.study.simulation import simulation_of
+from tactbench.core.tables.terminal import remark
 
 _SCORES = ("effects", "estimator", "metric", "unit", "score", "sim_s", "reason")
 _EFFECTS = ("included", "effect", "cost_ms", "change", "unit", "reason")
@@ -34,16 +41,6 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
     The last table has the task's score with the effects chosen and with all of them.
     """
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.cost.knobs import task_score
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.names import grouped
-    from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.plugins.rigs import rig_context
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.simulation import simulation_of
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     rig_name = registry.first_rig("simulated")
     simulation = simulation_of(registry, rig_name, [sensor_name], effects)
@@ -104,11 +101,6 @@ def verify(ctx: click.Context, shape: str) -> None:
 
     Exit code 1 if a comparison is outside its bound.
     """
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     rig = registry.first_rig("simulated")
     where = registry.rigs[rig].verification

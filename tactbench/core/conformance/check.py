@@ -23,16 +23,14 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
-from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, line_in, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
 EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
 KINDS = EVERY_KIND[:-1]
 """Kinds of descriptors that can be checked, and `dataset` for a mapping file."""
-Mode = Literal["passive", "invasive", "recording"]
-"""Modes of checks. `passive`: no device is opened and nothing moves. `invasive`: a device is opened, or a rig presses.
-`recording`: only a recording is read."""
+Mode = Literal["passive", "recording"]
+"""Modes of checks. `passive`: no device is opened and nothing moves. `recording`: only a recording is read."""
 HEAVY = frozenset({
     "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
@@ -91,10 +89,6 @@ class Subject:
     registry: Registry
     recording: Path | None = None
     """Recording to be read in the mode `recording`."""
-    rig_file: Path | None = None
-    """Rig file of the devices to be opened in the mode `invasive`."""
-    operator: Operator | None = None
-    """The person who operates the rig in the mode `invasive`."""
     root: Path | None = None
     """Folder that contains the files of a data set."""
 

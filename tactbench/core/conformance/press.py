@@ -35,7 +35,7 @@ from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Environment, Indenter, Scene, Simulation, Slide
 from tactbench.core.spec.sensor import ChannelKind
 
-FORCE_N, REAL_N, EFFECT_N = 0.5, 1.0, 2.0  # every sensor bears the first; motors follow the second; effects need load
+FORCE_N, EFFECT_N = 0.5, 2.0  # every sensor bears the first; effects need load
 TASK_N = 5.0  # the range of our tasks of force
 NOISE_N = 0.005  # of the reference: a hundredth of the press, so that draws differ visibly
 SECONDS, LATE = 1.0, 0.5  # duration of a press; share by which a rig that begins later may deviate from it

@@ -140,17 +140,16 @@ def run_checks(
     modes
         Modes of the checks. In the mode `recording`, the plugin's code is not imported.
     isolated
-        True: run in a child process. Checks of the mode `invasive` always run in this process, without a time limit:
-        an interrupt must reach the rig.
+        True: run in a child process.
     without
         Names of checks to leave out.
     fields
-        Values of the subject's fields `recording`, `rig_file`, `operator` and `root`.
+        Values of the subject's fields `recording` and `root`.
     """
     subject = replace(subject, **fields)
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
-    while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
+    while waiting := [one.name for one in checks if one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; the remaining checks run in another process
@@ -159,9 +158,6 @@ def run_checks(
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
-    for one in checks:
-        if one.mode == "invasive":
-            outcomes[one.name] = _tried(subject, outcomes, one.name)
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
 
 

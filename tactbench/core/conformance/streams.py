@@ -19,7 +19,6 @@ from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.samples import Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
-from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
@@ -65,14 +64,14 @@ def read_back(path: Path) -> Recorded:
 
 def carried_out(
     rig: Any, sensor: SensorDescriptor, descriptor: RigDescriptor, scene: Scene, seed: int = 1,
-    rig_file: RigFile | None = None, opened: Callable[[Any], None] | None = None,
+    opened: Callable[[Any], None] | None = None,
 ) -> Recorded:  # fmt: skip
     """Record a scene as `tactbench record` does, and read it back; raise any error of the rig."""
     from tactbench.core.acquisition import acquire
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        request = RecordingRequest(sensor, descriptor, scene, path, seed, rig_file=rig_file)
+        request = RecordingRequest(sensor, descriptor, scene, path, seed)
         made = acquire(rig, request, clock=time.perf_counter, opened=opened)
         if made.excluded:
             fail("recording", f"the recording is {made.excluded}")

@@ -12,7 +12,8 @@ from tactbench.core.tables.text_table import TextTable, text_table
 _FIGURES = {
     "precision": "precision", "recall": "recall", "misses": "misses", "events": "events",
     "latency p50 [ms]": "onset latency p50 ms", "p95 [ms]": "onset latency p95 ms",
-    "false alarms/min": "false alarms per minute", "compute [s/s]": "compute s per s of signal",
+    "false alarms/min": "false alarms per minute",
+    "compute [s/s]": "compute s per s of signal",
 }  # fmt: skip
 """Key of the figure of merit of each column."""
 _NOTE = (

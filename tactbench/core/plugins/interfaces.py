@@ -173,10 +173,6 @@ class RigCheck:
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
     """Reasons for refusing the rig file, each with the next step; empty: the file is valid."""
-    file: RigFile | None = None
-    """The rig file, with the values that the rig's settings add to its axes; None: it has no axes."""
-    travel_ceiling_n: float = 0.0
-    """Norm of the force at which an axis that does not press halts."""
 
 
 @dataclass(frozen=True)

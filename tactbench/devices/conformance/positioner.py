@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from tactbench.core.conformance.check import Subject, check, fail, skip
 from tactbench.devices.conformance.driver import Opened, emulated
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.positioner import NotReadyError, Positioner
 
 PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
@@ -23,7 +22,6 @@ class _Axis(NamedTuple):
     """A started axis with its emulator, whose position is the true one."""
 
     opened: Opened
-    devices: EmulatedDevices
 
     @property
     def driver(self) -> Any:
@@ -43,11 +41,11 @@ class _Axis(NamedTuple):
 
     def wait(self, seconds: float, until: Callable[[], bool]) -> None:
         """Update the driver until the condition `until` is true, at most for `seconds`."""
-        end_ns = self.devices.clock() + round(1e9 * seconds)
-        while not until() and (before_ns := self.devices.clock()) < end_ns:
+        end_ns = self.opened.clock() + round(1e9 * seconds)
+        while not until() and (before_ns := self.opened.clock()) < end_ns:
             self.opened.call("update", LOOK_S)
-            if self.devices.clock() == before_ns:
-                self.devices.advance(before_ns + round(1e9 * LOOK_S))
+            if self.opened.clock() == before_ns:
+                self.opened.wait(LOOK_S)
 
     def ended(self, what: str, target_m: float, seconds: float) -> None:
         """Wait for the end of a move; fail unless axis and driver then report its target [m], and remain there."""
@@ -83,18 +81,18 @@ def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     own = subject.descriptor.emulated_options
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
-    with emulated(subject, of_both=given) as (opened, devices):
+    with emulated(subject, of_both=given) as opened:
         if not hasattr(opened.emulator, "position_m"):
             fail("emulator", "the emulator lacks `position_m`, the axis' position [m] as its driver counts")
-        axis = _Axis(opened, devices)
+        axis = _Axis(opened)
         if homed:
             _home(axis)
         yield axis
 
 
 def _home(axis: _Axis) -> None:
-    until_ns = axis.devices.clock() + round(1e9 * HOMING_S)
-    axis.opened.call("home", lambda: axis.devices.clock() > until_ns)
+    until_ns = axis.opened.clock() + round(1e9 * HOMING_S)
+    axis.opened.call("home", lambda: axis.opened.clock() > until_ns)
     if not axis.driver.enabled:
         axis.opened.call("enable")
 

@@ -32,7 +32,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
     return [
         _effect("force-loop", "Motor under force control", "effects.force_loop:apply", "", "load reference-force"),
         _effect("contact", "Normal contact", "contact.stages:press_skin", "load core", "skin"),
-        _effect("core", "Touch-down on the core", "contact.core:with_core", "", "core"),
+        _effect("core", "Touch-down on the core", "contact.shell:with_core", "", "core"),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", "skin", "dc_pressure fluid"),
         _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", "", "shear"),
         _channels("gain", "Scatter of gains", produces="gain"),

@@ -149,8 +149,16 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
             "the contact would be one cell wide whatever the load.",
             hint=f"Use a radius of at least {3 * max(dx, ds):.1f} mm, or a sensor spec with more cells.",
         )
-    if contact.shape is not None:
-        _check_resolved(contact.shape, max(dx, ds))
+    if (shape := contact.shape) is not None:
+        cell, around = max(dx, ds), np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+        risen = float(shape.height_mm(cell * np.cos(around), cell * np.sin(around)).max())
+        if not risen <= cell * (1 + 1e-9):  # rounding of a flank at exactly 45 degrees
+            sizes = ", ".join(f"{name} {value:g}" for name, value in shape.sizes)
+            raise RigError(
+                f"The indenter {shape.name!r} ({sizes}) rises by {risen:.3g} mm within {cell:.2f} mm, a cell of the "
+                f"skin; at most {cell:.2f} mm, 45 degrees, is allowed.",
+                hint="Use a blunter or wider indenter, or a sensor spec with more cells.",
+            )
     slope = math.hypot(contact.tilt_x, contact.tilt_s)
     if not slope <= STEEPEST:
         raise RigError(
@@ -164,16 +172,4 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
             f"The contact point x = {contact.x_mm:.2f} mm, s = {contact.s_mm:.2f} mm lies outside the skin "
             f"(x from {x_low:.2f} to {x_high:.2f} mm, |s| up to {s_high:.2f} mm).",
             hint="Correct the scene's placement, or contact_x and contact_s among the sensor's parameters.",
-        )
-
-
-def _check_resolved(shape: Shape, cell_mm: float) -> None:
-    around = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
-    risen = float(shape.height_mm(cell_mm * np.cos(around), cell_mm * np.sin(around)).max())
-    if not risen <= cell_mm * (1 + 1e-9):  # rounding of a flank at exactly 45 degrees
-        sizes = ", ".join(f"{name} {value:g}" for name, value in shape.sizes)
-        raise RigError(
-            f"The indenter {shape.name!r} ({sizes}) rises by {risen:.3g} mm within {cell_mm:.2f} mm, a cell of the "
-            f"skin; at most {cell_mm:.2f} mm, 45 degrees, is allowed.",
-            hint="Use a blunter or wider indenter, or a sensor spec with more cells.",
         )

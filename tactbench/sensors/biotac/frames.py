@@ -105,8 +105,8 @@ class FrameRows:
             self._places.append((*columns[name], seen[name]))
             seen[name] += 1
         self._expected: Counter[tuple[int, int]] = Counter((k, nth) for k, _, nth in self._places)
-        self._open: list[_Row | None] = [None] * len(self._streams)
-        self._done: list[list[_Row]] = [[] for _ in self._streams]
+        self._rows: list[list[_Row]] = [[] for _ in self._streams]
+        """Rows of each stream in their order, the last of which may be incomplete."""
 
     def put(
         self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None
@@ -119,55 +119,37 @@ class FrameRows:
         frame, place = divmod(position, len(self.frame))
         k, column, nth = self._places[place]
         sequence = frame * self._rows_per_frame[k] + nth
-        row = self._open[k]
-        if row is None or row.sequence != sequence:
-            self._close(k)
-            width = len(self._streams[k].channels)
-            row = _Row(
-                sequence,
-                t_ns,
-                device_ns,
-                np.zeros(width, dtype=self._streams[k].dtype),
-                np.full(width, Quality.MISSING, dtype=np.uint8),
-                self._expected[k, nth],
-            )
-            self._open[k] = row
+        rows = self._rows[k]
+        if not (rows and rows[-1].to_come and rows[-1].sequence == sequence):
+            data = np.zeros(len(self._streams[k].channels), dtype=self._streams[k].dtype)
+            missing = np.full(data.size, Quality.MISSING, dtype=np.uint8)
+            rows.append(_Row(sequence, t_ns, device_ns, data, missing, self._expected[k, nth]))
+        row = rows[-1]
         row.data[column], row.quality[column] = count, quality
         row.to_come -= 1
-        if row.to_come == 0:
-            self._close(k)
 
-    def _close(self, k: int) -> None:
-        row = self._open[k]
-        if row is not None:
-            self._done[k].append(row)
-            self._open[k] = None
-
-    def close(self) -> None:
-        """End all incomplete rows; words not received are marked MISSING."""
-        for k in range(len(self._streams)):
-            self._close(k)
-
-    def blocks(self) -> list[Block]:
+    def blocks(self, *, incomplete: bool = False) -> list[Block]:
         """Return the rows that ended since the last call, in one block for each stream with such rows.
 
-        A row of ``electrodes`` is one frame. Its times are those of the frame's first command but PAC; in the default
-        frame the others follow every 454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
+        With `incomplete`, the last rows end, too: words not received are marked MISSING. A row of ``electrodes`` is one
+        frame. Its times are those of the frame's first command but PAC; in the default frame the others follow every
+        454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
         """
         found = []
-        for stream, rows in zip(self._streams, self._done, strict=True):
-            if rows:
+        for stream, rows in zip(self._streams, self._rows, strict=True):
+            left = [row for row in rows[-1:] if row.to_come and not incomplete]
+            ended, rows[:] = rows[: len(rows) - len(left)], left
+            if ended:
                 found.append(
                     Block(
                         stream=stream.name,
-                        t_ns=_times([row.t_ns for row in rows]),
-                        data=np.stack([row.data for row in rows]),
-                        quality=np.stack([row.quality for row in rows]),
-                        sequence=np.array([row.sequence for row in rows], dtype=np.int64),
-                        device_ns=_times([row.device_ns for row in rows]),
+                        t_ns=_times([row.t_ns for row in ended]),
+                        data=np.stack([row.data for row in ended]),
+                        quality=np.stack([row.quality for row in ended]),
+                        sequence=np.array([row.sequence for row in ended], dtype=np.int64),
+                        device_ns=_times([row.device_ns for row in ended]),
                     )
                 )
-                rows.clear()
         return found
 
 

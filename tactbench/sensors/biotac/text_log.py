@@ -86,9 +86,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             t_ns = round(line.time_s * 1e9) if timed else None
             rows.put(position, line.reply.value or 0, quality_of(line.reply), t_ns)
             samples.append((position, line.time_s))
-    rows.close()
     rate_hz, source = _rate(settings, header, samples)
-    streams, blocks = streams_of(order, rate_hz, source), rows.blocks()
+    streams, blocks = streams_of(order, rate_hz, source), rows.blocks(incomplete=True)
     if not timed and rate_hz is not None:
         period_ns = {stream.name: 1e9 / stream.rate_hz for stream in streams if stream.rate_hz is not None}
         blocks = [

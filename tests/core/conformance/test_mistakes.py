@@ -10,10 +10,10 @@ from tactbench.core.plugins.registry import load_registry
 from tests.conftest import THIRD_PARTY
 
 SHELF = THIRD_PARTY / "flawed"
-SOUND = ("axis", "rig", "press", "task", "force", "profile")  # the others are among those of the makers
-PACKAGE = {"pad": "devices", "scale": "devices", "stage": "devices", "axis": "devices", "rig": "rigs", "press": "rigs"}
+SOUND = ("axis", "rig", "task", "force", "profile")  # the others are among those of the makers
+PACKAGE = {"pad": "devices", "scale": "devices", "stage": "devices", "axis": "devices", "rig": "rigs"}
 KIND = {
-    "pad": "sensor", "scale": "device", "stage": "device", "axis": "device", "rig": "rig", "press": "rig",
+    "pad": "sensor", "scale": "device", "stage": "device", "axis": "device", "rig": "rig",
     "task": "task", "force": "task", "estimator": "estimator",
     "effect": "effect", "shape": "indenter", "profile": "profile",
 }  # fmt: skip
@@ -119,11 +119,6 @@ MISTAKES = [
     ("rig", "self.t_s * 1e9", "self.t_s * 1e3", "press-is-recorded", "milliseconds"),
     ("rig", '{"rate_hz": 100.0}', '{"rate_hz": 200.0}', "press-is-recorded", "200 Hz is stated"),
     ("rig", "t_ns, data)", "t_ns, data[:, 1:])", "press-is-recorded", "of shape (100, 11)"),
-    ("press", "force = self.force[rows] + LEFT_N", "force = -self.force[rows]", "real-rig-presses", "sign reversed?"),
-    ("press", "+ LEFT_N", "+ (2.0 if 300 < begin < 400 else 0.0)", "real-rig-presses", "the force rises to"),
-    ("press", "seed)\n\n\nclass PressRig", "seed)\n        globals()['LEFT_N'] = 0.4\n\n\nclass PressRig",
-     "real-rig-presses", "before contact"),
-    ("press", "self.stopped = True", "self.stopped = False", "real-rig-presses", "are left after the retreat"),
     ("task", 'metric="macro_f1"', 'metric="macro_f2"', "", "did you mean macro_f1"),
     ("task", 'target=LabelTarget(name="side")', "target=ChannelTarget()", "", "give a target with classes"),
     ("task", 'metric="macro_f1"', 'metric="rmse"', "metric-has-its-unit", "is for regression"),
@@ -189,19 +184,14 @@ def all_but(check):
     return {one.name for one in CHECKS if one.mode != "recording"} - set(wanted)
 
 
-def report_of(registry, tmp_path, kind, name, without=()):
+def report_of(registry, kind, name, without=()):
     (subject,) = subjects_named(registry, name, (kind,))
-    rig_file = None
-    if name.endswith("press"):
-        rig_file = tmp_path / "rig.yaml"
-        rig_file.write_text(f"version: 1\nrig: {name}\nsensors:\n  sound-pad: {{link: 'loop://'}}\n")
-    modes = ("passive",) if rig_file is None else ("passive", "invasive")
-    return run_checks(subject, modes=modes, rig_file=rig_file, isolated=False, without=without)
+    return run_checks(subject, isolated=False, without=without)
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_without_a_mistake_it_passes(registry, tmp_path, name):
-    report = report_of(registry, tmp_path, KIND[name], f"sound-{name}")
+def test_without_a_mistake_it_passes(registry, name):
+    report = report_of(registry, KIND[name], f"sound-{name}")
     assert report.ok, str(report)
     assert report.level == "silver"
 
@@ -211,13 +201,13 @@ def test_without_a_mistake_it_passes(registry, tmp_path, name):
     PLANTED,
     ids=[f"{row[1]}-{row[4]}-{row[0]}" for row in PLANTED],
 )
-def test_a_mistake_is_found_and_named(registry, tmp_path, number, name, right, wrong, check, words):
+def test_a_mistake_is_found_and_named(registry, number, name, right, wrong, check, words):
     if not check:
         (row,) = plugins_named(registry, f"planted-{number}")
         assert row.status == "failed"
         assert words in row.reason
         return
-    report = report_of(registry, tmp_path, KIND[name], f"planted{number}-{name}", all_but(check))
+    report = report_of(registry, KIND[name], f"planted{number}-{name}", all_but(check))
     found = {one.check: f"{one.where}: {one.text}" for one in report.failed}
     assert words in found.get(check, ""), str(report)
     assert report.level is None

@@ -86,18 +86,19 @@ def test_what_was_finished_is_found_again(shelf, tmp_path):
     assert times == {one["value"]: one["fit_s"] for one in few["settings"]}, "nothing is timed twice"
 
 
-def test_the_figure_has_a_path_for_each_knob_and_one_mark_for_each_family(known):
+def test_the_figure_has_a_path_for_each_knob_and_a_panel_for_each_sensor(known):
     with styled():
         drawn = draw_trade(known)
-        points = [cost_point(t, 1 / t, subject=name, family=one) for name in "ab" for t, one in ((1, name), (2, "x"))]
-        panels = draw_precision(points, "Two sensors").axes
+        panels = draw_precision([cost_point(t, 1 / t, subject=name) for name in "ab" for t in (1, 2)], "Two").axes
     paths = {line.get_label(): line for axes in drawn.axes for line in axes.get_lines()}
     for knob in ("trees", "window k", "every n-th sample"):
         own = [one for one in known["settings"] if one["knob"] == knob]
         assert list(paths[knob].get_xdata()) == [one["answer_delay_ms"] for one in own]
         assert list(paths[knob].get_ydata()) == [one["score"] for one in own]
-    marks = [[line.get_marker() for line in axes.get_lines() if line.get_label() == "x"] for axes in panels]
-    assert marks[0] == marks[1]
+    for axes in panels:
+        points, noise = axes.get_lines()
+        assert (list(points.get_xdata()), list(points.get_ydata())) == ([1, 2], [1, 0.5])
+        assert noise.get_ydata()[0] == pytest.approx(0.1)
 
 
 def test_settings_are_the_defaults_and_values_on_either_side(registry):
@@ -121,10 +122,10 @@ def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
     assert quick_estimator(registry, "force") == "ols"
 
 
-def cost_point(seconds, error, *, default=False, floor=0.3, subject="pad", family="newton"):
+def cost_point(seconds, error, *, subject="pad"):
     return CostPoint(
         subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=floor, default=default, rung="", settings={"family": family},
+        floor=0.3, default=False, rung="", settings={},
     )  # fmt: skip
 
 

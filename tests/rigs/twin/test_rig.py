@@ -193,7 +193,7 @@ print(" ".join(mine))
     assert "contact.foam" in answer
     assert "effects.creep" in answer
     assert "effects.channels" in answer
-    for left_out in ("core", "shell", "layer"):
+    for left_out in ("shell", "layer"):
         assert f"contact.{left_out}" not in answer
     for left_out in ("force_loop", "friction", "heat", "skin_vibration"):
         assert f"effects.{left_out}" not in answer

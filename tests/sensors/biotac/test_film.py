@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tactbench.sensors.biotac.channels import ELECTRODES
-from tactbench.sensors.biotac.film import core_mm, mid_film_mm, spectral_interpolation
-from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM
-from tactbench.sensors.biotac.sheet import faces_between
+from tactbench.sensors.biotac.conduction import faces_between
+from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM, core_reach_mm
 from tactbench.sensors.biotac.spec import SKIN
+from tactbench.sensors.biotac.transduction import mid_film_mm, spectral_interpolation
 
 OUTER, DOME = SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm")
 
@@ -30,7 +30,9 @@ def test_every_electrode_is_let_into_the_core_by_the_same_depth():
         height, angle = np.hypot(electrode.y_mm, electrode.z_mm), np.arctan2(electrode.y_mm, -electrode.z_mm)
         behind = min(electrode.x_mm, 1.8)
         ray = np.arctan2(electrode.x_mm - behind, height)
-        let_in = core_mm(np.array(behind), np.array(ray), np.array(angle)) - np.hypot(electrode.x_mm - behind, height)
+        let_in = core_reach_mm(np.array(behind), np.array(ray), np.array(angle)) - np.hypot(
+            electrode.x_mm - behind, height
+        )
         # Along the ray, which leans on the facet by up to 22 degrees; electrode 1 has a bevel of its own.
         assert 0.9 * (CORE_MM - ELECTRODES_MM) < let_in < 1.4 * (CORE_MM - ELECTRODES_MM)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -80,12 +80,6 @@ def ordered(n: int) -> list[Any]:
     import matplotlib
 
     return [matplotlib.colormaps["viridis"](value) for value in np.linspace(0.0, 0.88, n)]
-
-
-def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Return a colour for each sensor in the rows of a folder, the same for all its figures."""
-    names = sorted({str(row["sensor"]) for row in rows})
-    return {name: LINES[place % len(LINES)] for place, name in enumerate(names)}
 
 
 def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:

@@ -17,17 +17,10 @@ def slopes(x: FloatArray, y: FloatArray) -> FloatArray:
     secants have one sign: monotone data give a monotone interpolant (Hyman 1983). On a BioTac's electrodes below
     touch-down the error at equal nodes is 2 to 13 times smaller than that of PCHIP, whose slopes are of second order.
     """
-    n = x.size
-    h = np.diff(x)
-    secant = np.diff(y, axis=0) / h[:, None]
-    if n == 2:
-        return np.repeat(secant, 2, axis=0)
-    if n == 3:
-        # The parabola through three points.
-        middle = (h[1] * secant[0] + h[0] * secant[1]) / (h[0] + h[1])
-        d = np.stack([2 * secant[0] - middle, middle, 2 * secant[1] - middle])
-    else:
-        d = _spline_slopes(h, secant)
+    from scipy.interpolate import CubicSpline
+
+    secant = np.diff(y, axis=0) / np.diff(x)[:, None]
+    d = CubicSpline(x, y)(x, 1)
     left = np.concatenate([secant[:1], secant])
     right = np.concatenate([secant, secant[-1:]])
     bound = 3 * np.minimum(np.abs(left), np.abs(right))
@@ -35,22 +28,9 @@ def slopes(x: FloatArray, y: FloatArray) -> FloatArray:
     return np.where(left * right > 0, limited, np.where(left * right < 0, d, 0.0))
 
 
-def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
-    n = h.size + 1
-    matrix, right = np.zeros((n, n)), np.zeros((n, secant.shape[1]))
-    inner = np.arange(1, n - 1)
-    matrix[inner, inner - 1], matrix[inner, inner], matrix[inner, inner + 1] = h[1:], 2 * (h[:-1] + h[1:]), h[:-1]
-    right[1:-1] = 3 * (h[1:, None] * secant[:-1] + h[:-1, None] * secant[1:])
-    for end, (h0, h1), (s0, s1), neighbour in (
-        (0, (h[0], h[1]), (secant[0], secant[1]), 1),
-        (n - 1, (h[-1], h[-2]), (secant[-1], secant[-2]), n - 2),
-    ):
-        # Not-a-knot: the two outermost intervals share one cubic.
-        matrix[end, end], matrix[end, neighbour] = h1, h0 + h1
-        right[end] = ((h0 + 2 * (h0 + h1)) * h1 * s0 + h0**2 * s1) / (h0 + h1)
-    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-
-
+_ABOVE_POWER = 0.75
+"""Exponent of the variable above touch-down, ``(F - F_td)^0.75``: with five nodes there, the rms error over caps of 5
+to 40 mm is 0.05 to 0.12 counts, against 0.08 to 0.14 in F itself and 0.05 to 0.2 in the square root."""
 _ROUNDING_N = 0.05
 """Offset [N] under the power of the load; without the offset the power's slope at the break would be infinite."""
 
@@ -58,19 +38,23 @@ _ROUNDING_N = 0.05
 class Interpolant:
     """Piecewise cubic in (n,) ascending loads, n >= 2, of (n, c) values.
 
-    `breaks` are indices of nodes where one spline ends and the next begins. Beyond the last break the cubics' variable
-    is ``(load - load at that break) ** power``, rounded off; elsewhere it is the load itself.
+    `touch_down` (two of the loads; None: no such loads) are nodes where one spline ends and the next begins. Beyond the
+    second the cubics' variable is ``(load - second load)^0.75``, rounded off; elsewhere it is the load itself.
     """
 
-    def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
-        self.loads = loads
-        self._power = power
-        self._bent_from = max(breaks, default=0)
-        self._x = self._bent(loads)
-        edges = [0, *sorted(set(breaks) - {0, loads.size - 1}), loads.size - 1]
+    def __init__(
+        self, loads: Sequence[float], values: Sequence[FloatArray], touch_down: tuple[float, float] | None = None
+    ) -> None:
+        self.loads = np.array(loads)
+        last = self.loads.size - 1
+        breaks = [last] if touch_down is None else [loads.index(load) for load in touch_down]
+        self._bent_from = float(loads[breaks[-1]])
+        self._x = self._bent(self.loads)
+        edges = sorted({0, *breaks, last})
+        table = np.stack(values)
         coefficients = []
         for low, high in itertools.pairwise(edges):
-            x, y = self._x[low : high + 1], values[low : high + 1]
+            x, y = self._x[low : high + 1], table[low : high + 1]
             d = slopes(x, y)
             h = np.diff(x)[:, None]
             secant = np.diff(y, axis=0) / h
@@ -108,17 +92,15 @@ class Interpolant:
 
     def _stretch(self, load: FloatArray) -> FloatArray:
         """Return the (m,) derivatives, with respect to the load, of the variable of the cubics."""
-        beyond = load - self.loads[self._bent_from]
-        if self._power == 1.0:
+        beyond = load - self._bent_from
+        bent = _ABOVE_POWER * (np.maximum(beyond, 0.0) + _ROUNDING_N) ** (_ABOVE_POWER - 1.0)
+        if self._bent_from == self.loads[-1]:
             return np.ones_like(load)
-        bent = self._power * (np.maximum(beyond, 0.0) + _ROUNDING_N) ** (self._power - 1.0)
         # At the break itself either side may be meant: the steeper.
         return np.asarray(np.where(beyond < 0, 1.0, np.where(beyond > 0, bent, np.maximum(bent, 1.0))))
 
     def _bent(self, load: FloatArray) -> FloatArray:
-        if self._power == 1.0:
-            return load
-        beyond = np.maximum(load - self.loads[self._bent_from], 0.0)
-        # One variable throughout: the load up to the break, then the break's load plus the bent distance.
-        bent = (beyond + _ROUNDING_N) ** self._power - _ROUNDING_N**self._power
-        return np.asarray(np.minimum(load, self.loads[self._bent_from]) + bent)
+        """Return the variable of the cubics: the load up to the break, then the break's load plus the bent distance."""
+        beyond = np.maximum(load - self._bent_from, 0.0)
+        bent = (beyond + _ROUNDING_N) ** _ABOVE_POWER - _ROUNDING_N**_ABOVE_POWER
+        return np.asarray(np.minimum(load, self._bent_from) + bent)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import itertools
 
 import numpy as np
@@ -17,7 +16,7 @@ TABLE_SHARE = 1 / 3
 """Share of a tolerance that the load table may use; the contact solver may use the rest."""
 _PROBES = (0.3, 1.0)
 """Shares of the largest load at which a contact solver is compared with the next more accurate one."""
-_CHOSEN: dict[bytes, tuple[str, float]] = {}
+_CHOSEN: dict[str, tuple[str, float]] = {}
 
 
 def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
@@ -36,8 +35,7 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
         return
     # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
     spec, body = run.sensor.model_dump_json(), (run.contact.radius_mm, run.contact.shape)
-    text = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{run.tangential}|{slide_of(run)}"
-    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
+    key = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{run.tangential}|{slide_of(run)}"
     if key not in _CHOSEN:
         _CHOSEN[key] = _cheapest(run, names, largest_n, tolerance)
     run.rung, run.rung_error = _CHOSEN[key]

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinState
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import AnyPress, at_rest
+from tactbench.rigs.twin.contact.newton import Solution
+from tactbench.rigs.twin.contact.press import AnyPress
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
@@ -51,14 +52,12 @@ class LocalPress(AnyPress):
         self._depth = self._least_gap + 0.02
         self._cell = float(np.prod(medium.grid.cell_mm))
 
-    def __call__(self, force_n: float) -> SkinState:
-        """Return the skin under `force_n`; at zero force it is at rest.
+    def solve(self, force_n: float) -> Solution:
+        """Return the skin under a force above zero.
 
         The force is a convex function of the approach (the contact widens, foam hardens), so that Newton's steps from
         above the solution always converge.
         """
-        if force_n <= 0:
-            return at_rest(self.medium)
         depth = self._depth
         deflection, pressure, slope = self._pushed(depth)
         while self._cell * pressure.sum() < force_n:
@@ -77,7 +76,7 @@ class LocalPress(AnyPress):
                 hint="Set the option rung to default, or check the skin's parameters.",
             )
         self._depth = depth
-        return self.state(force_n, deflection, pressure, depth - self._least_gap, residual)
+        return Solution(np.array([depth - self._least_gap]), deflection, pressure, residual)
 
     def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
         """Return (nx, ns) deflection, (nx, ns) contact pressure and the summed stiffness at an approach of `depth` mm.

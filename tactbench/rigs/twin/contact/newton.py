@@ -43,7 +43,7 @@ class Solution:
     """Solved state of the skin under one load."""
 
     vector: FloatArray
-    """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
+    """(size + 1,) Fourier coefficients of the deflection (none in a closed form) and, last, the approach [mm]."""
     deflection_mm: FloatArray
     """(nx, ns) deflection of the skin."""
     pressure_mpa: FloatArray

@@ -18,38 +18,45 @@ class AnyPress(ABC):
     """Interface of every contact solver: one contact, at forces in any order."""
 
     touched_core = False
+    fluid_pressure = False
+    """True if states hold the pressure of the fluid in the skin."""
 
     def __init__(self, medium: Medium, contact: Contact) -> None:
         self.medium = medium
         self.contact = contact
 
     @abstractmethod
+    def solve(self, force_n: float) -> Solution:
+        """Return the skin under a force above zero."""
+
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
+        if force_n <= 0:
+            return at_rest(self.medium)
+        solution = self.solve(force_n)
+        medium, deflection, pressure, fluid_mpa = self.medium, solution.deflection_mm, solution.pressure_mpa, 0.0
+        if medium.zero_mean and self.fluid_pressure:
+            # The part of the mean contact pressure that the skin itself does not carry.
+            local, _ = medium.respond(deflection, np.empty(pressure.shape))
+            fluid_mpa = float(np.mean(pressure - local))
+        r2 = (medium.grid.x_mm[:, None] - self.contact.x_mm) ** 2
+        r2 = r2 + (medium.grid.s_mm[None, :] - self.contact.s_mm) ** 2
+        return SkinState(
+            grid=medium.grid,
+            force_n=force_n,
+            deflection_mm=deflection,
+            pressure_mpa=pressure,
+            thickness_mm=medium.thickness_mm(deflection),
+            depth_mm=solution.depth_mm,
+            fluid_pressure_mpa=fluid_mpa,
+            # sqrt(5/2 <r²>), weighted with the pressure: exact for Hertz, where counting cells is not.
+            contact_radius_mm=float(np.sqrt(2.5 * np.sum(pressure * r2) / np.sum(pressure))),
+            residual=solution.residual,
+        )
 
     def closing_at(self, force_n: float) -> float:
         """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
-        return -np.inf
-
-    def state(
-        self, force_n: float, deflection_mm: FloatArray, pressure_mpa: FloatArray,
-        depth_mm: float, residual: float, fluid_pressure_mpa: float = 0.0,
-    ) -> SkinState:  # fmt: skip
-        """Return the state of the skin for a solved contact."""
-        r2 = (self.medium.grid.x_mm[:, None] - self.contact.x_mm) ** 2
-        r2 = r2 + (self.medium.grid.s_mm[None, :] - self.contact.s_mm) ** 2
-        return SkinState(
-            grid=self.medium.grid,
-            force_n=force_n,
-            deflection_mm=deflection_mm,
-            pressure_mpa=pressure_mpa,
-            thickness_mm=self.medium.thickness_mm(deflection_mm),
-            depth_mm=depth_mm,
-            fluid_pressure_mpa=fluid_pressure_mpa,
-            # sqrt(5/2 <r²>), weighted with the pressure: exact for Hertz, where counting cells is not.
-            contact_radius_mm=float(np.sqrt(2.5 * np.sum(pressure_mpa * r2) / np.sum(pressure_mpa))),
-            residual=residual,
-        )
+        return self.medium.closing_mm(self(force_n).deflection_mm) if self.medium.has_core else -np.inf
 
 
 def at_rest(medium: Medium) -> SkinState:
@@ -86,39 +93,22 @@ class Press(AnyPress):
         self.gap_mm = gap_mm - gap_mm.min()
         self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
-        self._wants_fluid_pressure = fluid_pressure
+        self.fluid_pressure = fluid_pressure
         self._tolerance = tolerance
         self._solutions: dict[float, Solution] = {}
 
-    def __call__(self, force_n: float) -> SkinState:
-        """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
-        if force_n <= 0:
-            return at_rest(self.medium)
-        solution = self._solve(force_n)
-        return self.state(
-            force_n, solution.deflection_mm, solution.pressure_mpa,
-            solution.depth_mm, solution.residual, self._fluid_pressure(solution),
-        )  # fmt: skip
-
-    def closing_at(self, force_n: float) -> float:
-        """Return the distance [mm] by which the film is past closing at `force_n`; minus infinity without a core."""
-        if not self.medium.has_core:
-            return -np.inf
-        if force_n <= 0:
-            return self.medium.closing_mm(np.zeros(self.gap_mm.shape))
-        return self.medium.closing_mm(self._solve(force_n).deflection_mm)
-
-    def _solve(self, force: float) -> Solution:
-        if force in self._solutions:
-            return self._solutions[force]
-        solution = self._started(force)
+    def solve(self, force_n: float) -> Solution:
+        """Return the skin under a force above zero, with the core from the load on that closes the film."""
+        if force_n in self._solutions:
+            return self._solutions[force_n]
+        solution = self._started(force_n)
         if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
             self.touched_core = True
             if self._core is not None:
                 self.medium = self._core(self.medium)
                 self._solver = NewtonSolver(self.medium, self.gap_mm)
-                solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
-        self._solutions[force] = solution
+                solution = self._solver.solve(force_n, solution.vector, tolerance=self._tolerance)
+        self._solutions[force_n] = solution
         return solution
 
     def _started(self, force: float) -> Solution:
@@ -151,10 +141,3 @@ class Press(AnyPress):
                     weight *= (force**0.5 - other) / (u[i] - other)
             guess += weight * self._solutions[load].vector
         return guess
-
-    def _fluid_pressure(self, solution: Solution) -> float:
-        """Return the fluid's pressure, the part of the mean contact pressure that the skin itself does not carry."""
-        if not (self.medium.zero_mean and self._wants_fluid_pressure):
-            return 0.0
-        local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))
-        return float(np.mean(solution.pressure_mpa - local))

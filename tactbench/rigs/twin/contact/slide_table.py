@@ -21,7 +21,7 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import Skin, SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.load_table import LoadTable, through
+from tactbench.rigs.twin.contact.load_table import LoadTable
 from tactbench.rigs.twin.contact.press import AnyPress
 from tactbench.rigs.twin.contact.tangential import Direction, TangentialResponse, tangential_of
 
@@ -115,9 +115,7 @@ def build_slide_table(
         proportional.append(np.concatenate([even[push] for push in _SHARES.tolist()]))
         partial.append(np.concatenate([first[push] - even[push] for push in _PUSHES.tolist()]))
     loads = table.loads_n.tolist()
-    return SlideTable(
-        friction, through(loads, proportional, table.touch_down_n), through(loads, partial, table.touch_down_n)
-    )
+    return SlideTable(friction, *(Interpolant(loads, one, table.touch_down_n) for one in (proportional, partial)))
 
 
 def _between(nodes: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:

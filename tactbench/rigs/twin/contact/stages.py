@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ class _Tabulated:
     remarks: Mapping[str, Scalar]
 
 
-_TABLES: dict[bytes, _Tabulated] = {}
+_TABLES: dict[str, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
@@ -133,34 +132,29 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
         f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
         f"|{run.tangential}|{slide_of(run)}"
     )
-    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
-    if key in _TABLES:
-        return _TABLES[key]
+    if text in _TABLES:
+        return _TABLES[text]
     began = time.perf_counter()
-    made = _tabulate(run, names, largest, within_reach=not only_skin)
+    press, read = pressed(run, names, run.fidelity)
+    tolerances, nodes = _tolerance(run, names), run.fidelity.most_nodes
+    table = build_table(press, read, largest_n=largest, tolerance=tolerances, most_nodes=nodes)
+    slide, sliding = slide_of(run), None
+    if names and slide is not None:
+        from tactbench.rigs.twin.contact.slide_table import build_slide_table
+
+        sliding = build_slide_table(press, read, table, run.skin, *slide)
+    if not only_skin:
+        check_reach(press, largest, run.skin.sheet)
+    remarked = remarks(press, largest, run.skin.sheet)
+    made = _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
     # Whichever effect needs the table first, its time is that of the contact.
     spent = time.perf_counter() - began
     run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
     run.elsewhere_s += spent
     if len(_TABLES) == _MOST_TABLES:
         del _TABLES[next(iter(_TABLES))]
-    _TABLES[key] = made
+    _TABLES[text] = made
     return made
-
-
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
-    press, read = pressed(run, names, run.fidelity)
-    tolerance, nodes = _tolerance(run, names), run.fidelity.most_nodes
-    table = build_table(press, read, largest_n=largest, tolerance=tolerance, most_nodes=nodes)
-    slide, sliding = slide_of(run), None
-    if names and slide is not None:
-        from tactbench.rigs.twin.contact.slide_table import build_slide_table
-
-        sliding = build_slide_table(press, read, table, run.skin, *slide)
-    if within_reach:
-        check_reach(press, largest, run.skin.sheet)
-    remarked = remarks(press, largest, run.skin.sheet)
-    return _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])

@@ -25,7 +25,13 @@ def apply(run: Synthesis) -> None:
             pressure_mpa = pressure_mpa + slope[:, 0] * track.vibration_mm
         for column in columns:
             channel = track.channels[column]
-            track.readings[:, column] += within_band(track.t_s, 1e6 * pressure_mpa, channel) / _pa_per_count(channel)
+            if channel.scale is None:
+                raise NotApplicable(
+                    f"{channel.name} states no scale (Pa/count), which is needed to convert its pressure to counts.",
+                    hint="State the channel's scale (Pa/count) in the sensor's spec.",
+                )
+            passed_pa = within_band(track.t_s, 1e6 * pressure_mpa, channel)
+            track.readings[:, column] += passed_pa / channel.scale.to("Pa/count")
 
 
 def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
@@ -42,12 +48,3 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
     low, high = channel.band.lower, channel.band.upper
     passed = pressure_pa - lag(t_s, pressure_pa, 1.0 / (2.0 * math.pi * low))
     return lag(t_s, passed, 1.0 / (2.0 * math.pi * high))
-
-
-def _pa_per_count(channel: ChannelSpec) -> float:
-    if channel.scale is None:
-        raise NotApplicable(
-            f"{channel.name} states no scale (Pa/count), which is needed to convert its pressure to counts.",
-            hint="State the channel's scale (Pa/count) in the sensor's spec.",
-        )
-    return channel.scale.to("Pa/count")

@@ -74,37 +74,24 @@ def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
 def slip_s(mode: Mode, u: float, speed: float) -> float:
     """Return the duration of the slip in seconds; infinity if the skin never sticks again.
 
-    The velocity rises throughout the half period after its minimum, so that it reaches the surface's speed once there:
-    the time is found by Newton steps inside a shrinking bracket, to the last digits.
+    The velocity rises throughout the half period after its minimum, so that it reaches the surface's speed once there.
     """
+    from scipy.optimize import brentq
+
     w, r = mode.swing, mode.decay
     back = (mode.omega**2 * u + r * speed) / w
     if not u > 0:
         return math.inf
+
+    def excess(t: float) -> float:
+        return math.exp(-r * t) * (speed * math.cos(w * t) - back * math.sin(w * t)) - speed
+
     low = math.atan2(r * speed + back * w, r * back - speed * w) / w
     high = low + math.pi / w
-
-    def excess(t: float) -> tuple[float, float]:
-        c, s, faded = math.cos(w * t), math.sin(w * t), math.exp(-r * t)
-        velocity = faded * (speed * c - back * s)
-        return velocity - speed, -r * velocity - faded * w * (speed * s + back * c)
-
-    if excess(high)[0] < 0:
+    if excess(high) < 0:
         return math.inf
-    t = 2.0 / mode.omega * (math.pi - math.atan2(mode.omega * u, speed))
-    for _ in range(60):
-        if not low < t < high:
-            t = 0.5 * (low + high)
-        value, slope = excess(t)
-        if value < 0:
-            low = t
-        else:
-            high = t
-        step = value / slope if slope > 0 else math.inf
-        if abs(step) <= 1e-15 * t or high - low <= 1e-15 * high:
-            break
-        t -= step
-    return t
+    # In the rounding of a deflection of almost nothing the velocity may not fall at all.
+    return low if excess(low) >= 0 else float(brentq(excess, low, high, xtol=1e-18, rtol=1e-15))
 
 
 def shaken(t_s: FloatArray, pushed: FloatArray, mode: Mode) -> FloatArray:

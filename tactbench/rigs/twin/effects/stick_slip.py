@@ -21,12 +21,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
-from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle_below, coefficient
+from tactbench.rigs.twin.effects.memory import recurrence
 from tactbench.rigs.twin.effects.skin_mode import Mode, deflection_after, is_caught, slip_s, swing
 from tactbench.rigs.twin.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.synthesis import Tangential
 
 REST, STICK, SLIP, SLIDE, HELD = range(5)
+COULOMB_MM_S = 1e-6
+"""Stribeck speed below which friction falls from static to kinetic at once; all measured speeds are higher."""
+NOTHING_MM = 1e-12
+"""Deflection, a femtometre, below which a deflection counts as zero."""
 _LEAST_LOAD_N = 1e-4
 """Smallest load [N] with stick-slip; under smaller loads the skin slides steadily."""
 _RUNG_OUT = math.log(1e3)
@@ -64,15 +68,18 @@ class Dragged:
         self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
         """(m,) deflection at which a slip begins while the surface moves."""
         self._release_mm = drive.static * drive.load_n * per_n
-        self._kinetic = self._within_slip(per_n)
+        # Friction during a slip: at the mean speed of an undamped one.
+        u = (drive.static - drive.kinetic) * drive.load_n * per_n
+        mean_mm_s = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
+        self._kinetic = coefficient(mean_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
         self._kinetic_mm = self._kinetic * drive.load_n * per_n
-        steady = coefficient(drive.speed_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
+        steady = coefficient(np.array(drive.speed_mm_s), drive.static, drive.kinetic, drive.stribeck_mm_s)
         self._steady_mm = steady * drive.load_n * per_n
         self._breaks = (
             contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
         )
         """(m,) True where sliding is unstable, so that stick-slip occurs."""
-        self._way_mm = drive.speed_mm_s * drive.t_s
+        self._lead_mm = drive.speed_mm_s * drive.t_s - self._static_mm
         self._x_t: list[FloatArray] = []
         self._x_mm: list[FloatArray] = []
         self._phases: list[tuple[float, int, float, float, float]] = []
@@ -88,21 +95,6 @@ class Dragged:
     def let_go_s(self) -> FloatArray:
         """(k,) times at which the skin began to slip."""
         return np.asarray(self._begin[self._kind == SLIP])
-
-    @property
-    def caught_s(self) -> FloatArray:
-        """(k,) times at which the skin began to stick."""
-        return np.asarray(self._begin[self._kind == STICK])
-
-    def _within_slip(self, per_n: FloatArray) -> FloatArray:
-        """Return the (m,) friction coefficients during a slip: those at the mean speed of an undamped slip."""
-        drive = self.drive
-        if drive.stribeck_mm_s < COULOMB_MM_S:
-            return np.full(drive.t_s.size, drive.kinetic)
-        u = (drive.static - drive.kinetic) * drive.load_n * per_n
-        mean = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
-        weaker = np.exp(-mean / drive.stribeck_mm_s)
-        return np.asarray(drive.kinetic + (drive.static - drive.kinetic) * weaker)
 
     def _unstable(self) -> npt.NDArray[np.bool_]:
         """Return (m,) True where friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
@@ -152,25 +144,15 @@ class Dragged:
         lead_mm = drive.speed_mm_s * t - x
         if x >= np.interp(t, drive.t_s, self._static_mm):
             return t, x
-        at, size = int(np.searchsorted(drive.t_s, t, side="right")), 8
-        while at < drive.t_s.size:
-            lead = self._way_mm[at : at + size] - self._static_mm[at : at + size]
-            over = lead >= lead_mm
-            first = int(over.argmax())
-            if over[first]:
-                return self._crossing(at + first, lead_mm, t, x, end)
-            if drive.t_s[min(at + size, drive.t_s.size) - 1] >= end:
-                break
-            at, size = at + size, 2 * size
+        at = int(np.searchsorted(drive.t_s, t, side="right"))
+        over = self._lead_mm[at:] >= lead_mm
+        if over.any():
+            node = at + int(over.argmax())
+            low, high = self._lead_mm[node - 1 : node + 1]
+            share = (lead_mm - low) / (high - low) if high > low else 1.0
+            cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
+            end = min(max(float(cross), t), end)
         return end, x + drive.speed_mm_s * (end - t)
-
-    def _crossing(self, node: int, lead_mm: float, t: float, x: float, end: float) -> tuple[float, float]:
-        drive = self.drive
-        low, high = (self._way_mm[n] - self._static_mm[n] for n in (node - 1, node))
-        share = (lead_mm - low) / (high - low) if high > low else 1.0
-        cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
-        cross = min(max(float(cross), t), end)
-        return cross, x + drive.speed_mm_s * (cross - t)
 
     def _slide(self, t: float, x: float, end: float) -> tuple[float, float]:
         """Append a phase of sliding from time t until it is unstable or `end`; return its end time and deflection."""
@@ -184,7 +166,7 @@ class Dragged:
         limit = np.interp(knots, drive.t_s, self._steady_mm)
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
-        deflection = bristle_below(knots, drive.speed_mm_s, limit, x, most)
+        deflection = bristle(knots, drive.speed_mm_s, limit, x, most)
         self._add(t, SLIDE, x)
         self._x_t.append(knots)
         self._x_mm.append(deflection)
@@ -248,3 +230,42 @@ class Dragged:
             slipping=slipping,
             stick_ratio=np.where(touched & ~slipping, stick_ratio(share), 0.0),
         )
+
+
+def coefficient(speed_mm_s: FloatArray, static: float, kinetic: float, stribeck_mm_s: float) -> FloatArray:
+    """Return (n,) friction coefficients at (n,) speeds: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
+
+    The coefficient falls fastest at rest, so that the slowest slide is the least stable. For ``v_s`` below a nanometre
+    per second it has two values only, static and kinetic (Coulomb).
+    """
+    if stribeck_mm_s < COULOMB_MM_S:
+        return np.where(speed_mm_s == 0, static, kinetic)
+    return np.asarray(kinetic + (static - kinetic) * np.exp(-np.abs(speed_mm_s) / stribeck_mm_s))
+
+
+def bristle(
+    t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float, most_mm: FloatArray | None = None
+) -> FloatArray:
+    """Return the (n,) deflection of the LuGre bristle at (n,) ascending times and a constant speed, from `start_mm` on.
+
+    Canudas de Wit, Olsson, Åström and Lischinsky 1995: ``dz/dt = v - |v| z/g(v)``. With v and g held over a step, z
+    decays exponentially with the distance travelled: ``z' = b z + (1 - b) g sign(v)``, ``b = exp(-|v| dt/g)``.
+
+    At a speed of 0, and between equal times, the deflection stays. `limit_mm` (n,) is the deflection ``g`` of steady
+    sliding, at least 0 and constant from each sample to the next; where it is 0, motion leaves no deflection. With
+    `most_mm` (n,), the deflection is at most this at every sample; samples are computed one after the other only if
+    this limit is reached, which is rare.
+    """
+    way = abs(speed_mm_s) * np.diff(t_s, prepend=t_s[:1])
+    held = np.concatenate([limit_mm[:1], limit_mm[:-1]])
+    lost = -np.expm1(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > NOTHING_MM))
+    drive = lost * held * np.sign(speed_mm_s)
+    drive[0] = start_mm
+    found: FloatArray = recurrence(1.0 - lost, drive)
+    if most_mm is not None and (found > most_mm).any():
+        first = int((found > most_mm).argmax())
+        found[first] = most_mm[first]
+        for sample in range(first + 1, found.size):
+            free = (1.0 - lost[sample]) * found[sample - 1] + drive[sample]
+            found[sample] = min(free, most_mm[sample])
+    return found
