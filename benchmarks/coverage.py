@@ -269,7 +269,7 @@ def medians(trials: int, seed: int) -> None:
         cells = [name]
         for n in (5, 6, 7, 8, 10, 16):
             found = map(median_interval, draw(np.random.default_rng([seed, n]), (trials, n)))
-            cells.append(f"{100 * np.mean([one.low <= 0 <= one.high for one in found]):.1f}")
+            cells.append(f"{100 * np.mean([low <= 0 <= high for low, high in found]):.1f}")
         lines.append(cells)
     lines.append(["at least", *(f"{100 * least_coverage(n):.1f}" for n in (5, 6, 7, 8, 10, 16))])
     table("Coverage [%] of the median by campaigns", ["scores", *map(str, (5, 6, 7, 8, 10, 16))], lines)

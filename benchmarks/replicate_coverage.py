@@ -54,10 +54,11 @@ def main() -> None:
             held, held_others = [], []
             for _ in range(asked.groups):
                 chosen = rng.permutation(len(scores))
-                one = median_interval(scores[chosen[:SIZE]].tolist())
-                assert one is not None, "eight replicates have an interval"
-                held.append(one.low <= np.median(scores) <= one.high)
-                held_others.append(one.low <= np.median(scores[chosen[SIZE:]]) <= one.high)
+                known = median_interval(scores[chosen[:SIZE]].tolist())
+                assert known is not None, "eight replicates have an interval"
+                low, high = known
+                held.append(low <= np.median(scores) <= high)
+                held_others.append(low <= np.median(scores[chosen[SIZE:]]) <= high)
             ends = ("ci_low", "ci_high") if key == "score" else ("beyond_floor_ci_low", "beyond_floor_ci_high")
             single = [
                 row[ends[0]] <= other[key] <= row[ends[1]]

@@ -36,7 +36,7 @@ FOR_PEOPLE = ("table", "md", "latex")
     click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
                  help="Output format. Default: table, or the format of the suffix of --to."),
     click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-                 help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx."),
+                 help="Write a file: .txt, .md, .csv, .json, .tex."),
 )  # fmt: skip
 def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
@@ -77,7 +77,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     Parameters
     ----------
     shape
-        Format: one of `TABLE_FORMATS`; for a file also ``parquet`` or ``xlsx``.
+        Format: one of `TABLE_FORMATS`.
 
     Raises
     ------

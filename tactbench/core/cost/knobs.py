@@ -86,19 +86,18 @@ def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation:
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
     """Yield the settings varied for the first of `estimators`, and each of `estimators` with its defaults."""
-    first = estimators[0]
-    plain = EstimatorChoice(name=first.name)
+    first, plain = estimators[0], EstimatorChoice(name=estimators[0].name)
     own = first.params.get("n_estimators")
     for trees in sorted({*TREES, own}) if isinstance(own, int) else ():
-        changed = plain if trees == own else EstimatorChoice(name=first.name, params={"n_estimators": trees})
-        yield Setting("trees", str(trees), protocol, changed)
+        changed = EstimatorChoice(name=first.name, params={"n_estimators": trees})
+        yield Setting("trees", str(trees), protocol, plain if trees == own else changed)
     if task.answer_per != "frame" and not task.summaries:
         for k in WINDOWS:
-            same = first.window_grid == (k,)
-            yield Setting("window k", str(k), protocol if same else f"{protocol}@k={k}", plain)
+            yield Setting("window k", str(k), protocol if first.window_grid == (k,) else f"{protocol}@k={k}", plain)
         for every in EVERY:
-            name = protocol if every == 1 else f"{protocol}@every={every}"
-            yield Setting("every n-th sample", str(every), name, plain)
+            yield Setting(
+                "every n-th sample", str(every), f"{protocol}@every={every}" if every > 1 else protocol, plain
+            )
     for split in task.splits:
         if shots(split) and DEPLOYABLE.name in task.protocols:
             yield Setting("training sessions", str(shots(split)), DEPLOYABLE.name, plain, split)

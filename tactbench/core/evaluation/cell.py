@@ -39,11 +39,10 @@ from tactbench.core.evaluation.fitting import (
     routed,
 )
 from tactbench.core.evaluation.folds import TaskData, load_task
-from tactbench.core.evaluation.interval import score_interval
+from tactbench.core.evaluation.interval import Interval, replicates, score_interval, summed
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import replicates, summed
 from tactbench.core.evaluation.sets import tare_s
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -51,11 +50,9 @@ from tactbench.core.evaluation.splits import (
     OwnSplit,
     over_rows,
     used_rows,
-    without_part,
 )
 from tactbench.core.evaluation.summaries import band_limit, clocked, with_windows
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -128,17 +125,17 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
         build = one_model_a_component(task, lambda _: copy.deepcopy(given))
     descriptor = with_windows(descriptor, task, data.rules)
     fit_params = {} if given is None else routed(given, data, context.fit_params)
-    estimator = Configured(descriptor, build, context.params, fit_params)
-    metric, clock = context.metric or metric_called(task.metric), context.clock
+    metric = context.metric or metric_called(task.metric)
     rules = EventRules.of(task, descriptor.threshold) if task.kind == "events" else None
     counts = Counter(data.data.counts)
+    estimator = Configured(descriptor, build, context.params, fit_params, metric, rules, context.clock, counts)
     answered: list[AnsweredFold] = []
     with thread_limit(context.threads):
         for number, assignment in enumerate(data.assignments):
-            fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
-            answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
+            fitted = fitted_fold(estimator, data, assignment)
+            answered.append(answered_fold(estimator, data, fitted, number))
         cost, delay_remark = _cost(fitted, answered, data, descriptor, context)
-    return _result(answered, data, descriptor, metric, rules, cost, delay_remark, counts)
+    return _result(answered, data, estimator, cost, delay_remark)
 
 
 def _cost(
@@ -153,8 +150,8 @@ def _cost(
     times: dict[str, Any] = dict.fromkeys(("latency_ms_p50", "latency_ms_p95", "latency_n"))
     times |= {key: sum(one.spent[key] for one in answered) for key in answered[0].spent}
     if context.latency:
-        X = features_of(fitted.fold.test, descriptor)
-        waits_ms = 1e3 * calls_s(len(X), lambda place: X[place : place + 1], fitted.model.predict, context.clock)
+        rows = features_of(fitted.fold.test, descriptor)[:, None]  # each a set of one row
+        waits_ms = 1e3 * calls_s(rows, fitted.model.predict, context.clock)
         p95 = float(np.quantile(waits_ms, 0.95)) if len(waits_ms) >= CALLS_OF_P95 else None
         times |= {"latency_ms_p50": float(np.median(waits_ms)), "latency_ms_p95": p95, "latency_n": len(waits_ms)}
         ready_s = features_s(data, descriptor, fitted.fold.test.X, fitted.k, context.clock)
@@ -171,23 +168,16 @@ def _cost(
 
 
 def _result(
-    answered: Sequence[AnsweredFold],
-    data: TaskData,
-    descriptor: EstimatorDescriptor,
-    metric: Metric,
-    rules: EventRules | None,
-    cost: Cost,
-    delay_remark: str,
-    counts: Counter[str],
+    answered: Sequence[AnsweredFold], data: TaskData, estimator: Configured, cost: Cost, delay_remark: str
 ) -> Result:
-    task, made = data.task, data.data
+    task, made, metric, rules = data.task, data.data, estimator.metric, estimator.events
     classes = [] if rules else list(made.classes)
     n_classes = len(classes)
     sets = {role: _joined([one.sets[role] for one in answered]) for role in answered[0].sets}
     tested = sets["test"]
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
-        _refuse(descriptor.name, metric, tested)
+        _refuse(estimator.descriptor.name, metric, tested)
     unit = replicates(made, data.unit, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
@@ -197,7 +187,7 @@ def _result(
             scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
     remarks = _of_answers(data)
     beside: dict[str, Any] = {}
-    floor = truth = None
+    held = truth = None
     if metric.kind == "regression":
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
@@ -205,13 +195,13 @@ def _result(
         remarks.append(no_floor)
         truth = None if metric.function else true_force(task, made, tested)
         if floor is not None:
+            held = floor.by_replicate(tested, unit.codes)
             beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
             beside["score_beyond_floor"], interval = beyond_floor(floor, tested, unit)
-            beside |= {"beyond_floor_ci_low": interval.low, "beyond_floor_ci_high": interval.high}
+            beside |= _ends("beyond_floor_", interval)
         if truth is not None:
             interval = score_interval(metric, truth, tested.y_pred, unit, 0)
-            beside |= {"true_score": metric.of(truth, tested.y_pred), "true_ci_low": interval.low}
-            beside["true_ci_high"] = interval.high
+            beside |= {"true_score": metric.of(truth, tested.y_pred), **_ends("true_", interval)}
     elif rules is None:
         sums = METRICS["accuracy"].rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
@@ -227,14 +217,12 @@ def _result(
     if data.rules.tare and not held_s:
         remarks.append("not tared: no recording states an unloaded hold")
     remarks.append(delay_remark)
-    took_part, left_out, stamps = _part_taken(data)
+    took_part, stamps = _part_taken(data)
     specimens = {meta.labels.get("unit") for meta in took_part}
     interval = score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes)
     return Result(
         metric=metric.name,
         score=score,
-        ci_low=interval.low,
-        ci_high=interval.high,
         ci_method=interval.method,
         # R² of labels that never change is undefined and left out: NaN is no JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
@@ -246,18 +234,23 @@ def _result(
         fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, n_classes, floor, truth) if data.unit else {},
+        replicates=summed(metric, tested, unit, n_classes, held, truth) if data.unit else {},
         classes=classes,
         chosen=_chosen(answered, rules),
-        counts=dict(counts + Counter(left_out)),
+        counts=dict(estimator.counts),
         dagger=data.rules.three_sigma,
         stamps=stamps,
         findings=[*data.recorded.findings, *_groups_alike(data), *_untrained(answered)],
         tare_s=held_s or None,
         remarks=[one for one in remarks if one],
         **cost.model_dump(exclude_unset=True),
+        **_ends("", interval),
         **beside,
     )
+
+
+def _ends(prefix: str, interval: Interval) -> dict[str, Any]:
+    return {f"{prefix}ci_low": interval.low, f"{prefix}ci_high": interval.high}
 
 
 def _joined(folds: Sequence[Answers]) -> Answers:
@@ -277,8 +270,8 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
     raise DataError(f"The {metric.name} of {len(tested)} test rows is {why}.", hint="Choose another split or metric.")
 
 
-def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
-    """Return the recordings that a fold uses, counts of the recordings that no fold uses, and warnings of leaks."""
+def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], list[str]]:
+    """Return the recordings that a fold uses, and warnings of leaks."""
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
@@ -287,8 +280,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
         stamps = (*data.stamps, *leak_stamps(recorded, folds))
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    stamped = [*copied_channels(recorded), *stamps, *_incomplete(recorded)]
-    return took_part, without_part(recorded, data.split, used), stamped
+    stamped = [*copied_channels(recorded), *stamps]
+    return took_part, stamped
 
 
 def _of_answers(data: TaskData) -> list[str]:
@@ -299,16 +292,6 @@ def _of_answers(data: TaskData) -> list[str]:
     if data.held_back:
         remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
     return remarks
-
-
-def _incomplete(recorded: Dataset) -> list[str]:
-    """Return texts that count the incomplete recordings left out and those evaluated nevertheless, with reasons."""
-    start = "recordings left out ("
-    out = {name[len(start) : -1]: n for name, n in recorded.counts.items() if name.startswith(start + INCOMPLETE)}
-    taken = [meta.excluded for meta in recorded.metas if meta.excluded]
-    every = sum(out.values()) + len(recorded.metas)
-    parts = ((sum(out.values()), "left out:", out), (len(taken), "take part although", set(taken)))
-    return [f"{n} of {every} recordings {what} {'; '.join(sorted(why))}" for n, what, why in parts if n]
 
 
 def _groups_alike(data: TaskData) -> Iterator[str]:
@@ -341,10 +324,9 @@ def _chosen(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[
             values["threshold"] = one.detected[0].threshold
         for name, value in values.items():
             if isinstance(value, int | float) and np.isfinite(value):
-                each.setdefault(name, {})[one.name] = float(value)
+                each.setdefault(name, {})[f"{name} of fold {one.name}"] = float(value)
     chosen: dict[str, float] = {}
     for name, of in each.items():
-        some = set(of.values())
-        alike = len(of) == len(answered) and len(some) == 1
-        chosen |= {name: some.pop()} if alike else {f"{name} of fold {fold}": of[fold] for fold in of}
+        alike = len(of) == len(answered) and len(set(of.values())) == 1
+        chosen |= {name: next(iter(of.values()))} if alike else of
     return chosen

@@ -149,10 +149,7 @@ def nearest_rows(features: StreamData, other: StreamData, recording: str) -> Int
         return np.full(n, -1, dtype=np.int64)
     require_forward(other, recording)
     times = other.t_ns
-    after = np.clip(np.searchsorted(times, features.t_ns), 0, m - 1)
-    before = np.maximum(after - 1, 0)
-    earlier = np.abs(features.t_ns - times[before]) <= np.abs(times[after] - features.t_ns)
-    nearest = np.where(earlier, before, after)
+    nearest = np.searchsorted(times[1:] + times[:-1], 2 * features.t_ns)  # the earlier one of two equally near rows
     steps = [float(np.median(np.diff(t))) for t in (features.t_ns, times) if len(t) > 1]
     reach = max(steps, default=0.0) / 2
     near = np.abs(times[nearest] - features.t_ns) <= reach

@@ -26,7 +26,7 @@ from tactbench.core.evaluation.slip_reference import SlipReference, slip_referen
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import Answers, FloatArray, IntArray, Part, Quality, StreamData, StreamReadings
+from tactbench.core.samples import Answers, FloatArray, IntArray, Part, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
@@ -159,6 +159,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         recording is given twice, or no recording is left.
     """
     counts: Counter[str] = Counter()
+    incomplete: Counter[str] = Counter()
     seen: dict[str, dict[str, str]] = {}
     tables: list[Table] = []
     paths: list[Path] = []
@@ -166,7 +167,10 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     for path in recordings:
         with open_recording(path) as recording:
             excluded = recording.meta.excluded
-            if excluded and not (include_incomplete and excluded.startswith(INCOMPLETE)):
+            taken = include_incomplete and excluded.startswith(INCOMPLETE)
+            if excluded.startswith(INCOMPLETE):
+                incomplete[f"recordings {'take part although' if taken else 'left out:'} {excluded}"] += 1
+            if excluded and not taken:
                 counts[f"recordings left out ({excluded})"] += 1
                 continue
             names, table = _read(recording, task, counts)
@@ -207,8 +211,9 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     whole = task.answer_per != "sample"
     if whole:
         tables = [_whole(table, task, target) for table in tables]
-    findings = (*_in_some(seen, len(tables)), *_left_out(tables, task, target), *alike("classes", classes))
-    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole)
+    findings = [f"{n} of {len(recordings)} {what}" for what, n in incomplete.items()]
+    findings += [*_in_some(seen, len(tables)), *_left_out(tables, task, target), *alike("classes", classes)]
+    return Dataset(tuple(tables), features, classes, dict(counts), tuple(findings), tuple(paths), whole)
 
 
 def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:
@@ -287,7 +292,6 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     for stream in streams:
         picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
         values = numbers(stream)[:, picked]
-        _count_flags(stream, picked, counts)
         if task.summaries:
             own.append(_own_readings(stream, clock, picked, values, counts))
         names = [stream.spec.channels[place].name for place in picked]
@@ -339,20 +343,6 @@ def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> No
             f"In recording {meta.name!r}, {name} reaches {largest:.3g}; at most {LARGEST:g} is allowed.",
             hint="If this number means a missing sample, state it under `sentinels` in the mapping.",
         )
-
-
-def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]) -> None:
-    """Add to `counts` the samples flagged as saturated or suspect, and the rows after a gap, which are all kept."""
-    if stream.quality is None:
-        return
-    quality = stream.quality[:, picked]
-    for flag in (Quality.SATURATED, Quality.SUSPECT):
-        flagged = int(np.count_nonzero(quality & flag))
-        if flagged:
-            counts[f"{str(flag.name).lower()} samples kept"] += flagged
-    after_gap = int(np.count_nonzero((quality & Quality.GAP).any(axis=1)))
-    if after_gap:
-        counts[f"rows of {stream.spec.name} kept, before which others were lost"] += after_gap
 
 
 def _own_readings(
@@ -448,6 +438,5 @@ def _target_name(task: TaskSpec) -> str:
         return "slip of the reference"
     if isinstance(task.target, LabelTarget):
         return f"label {task.target.name!r}"
-    if isinstance(task.target, VectorTarget):
-        return f"{task.target.kind} samples called {' and '.join(map(repr, task.target.names))}"
-    return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")
+    names = [repr(one.name) for one in _channels_of(task) if one.name]
+    return f"{task.target.kind} sample" + (f" called {' and '.join(names)}" if names else "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.core.spec.task import TaskSpec
 
-T = TypeVar("T")
 Clock = Callable[[], float]
 """Function that returns the time in seconds, which never decreases."""
 
@@ -171,34 +170,30 @@ def features_s(data: TaskData, estimator: EstimatorDescriptor, X: FloatArray, k:
         return None
     if is_summarised(task, rules):
         work = recording_features(task, rules)
-        return float(np.median(calls_s(len(tables), tables.__getitem__, work, clock, AT_LEAST)))
+        return float(np.median(calls_s(tables, work, clock, AT_LEAST)))
     rest, scale = np.zeros(X.shape[-1]), FeatureScale(np.zeros(X.shape[-1]), np.ones(X.shape[-1]))
-    segment = np.zeros(k + 1, dtype=np.int64)
+    readings, segment = np.resize(X, (k + 1, *X.shape[1:])), np.zeros(k + 1, dtype=np.int64)
 
     def ready(readings: FloatArray) -> FloatArray:
-        return causal_mean(scale(readings - rest if rules.tare else readings), k, segment[: len(readings)])[-1:]
+        return causal_mean(scale(readings - rest if rules.tare else readings), k, segment)[-1:]
 
     # Rows stand for raw readings: values change no time. A median needs no more calls than the fewest.
-    return float(np.median(calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, AT_LEAST)))
+    return float(np.median(calls_s([readings], ready, clock, AT_LEAST)))
 
 
 def calls_s(
-    rows: int,
-    given: Callable[[int], T],
-    work: Callable[[T], object],
-    clock: Clock,
-    at_most: int = AT_MOST,
+    given: Sequence[Any] | FloatArray, work: Callable[[Any], object], clock: Clock, at_most: int = AT_MOST
 ) -> FloatArray:
-    """Return the (calls,) durations [s] of ``work(given(i))``, for row numbers i spread over `rows` rows.
+    """Return the (calls,) durations [s] of ``work`` called with items of a sequence.
 
-    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Rows are
-    spread because a model may answer some rows faster than others.
+    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Items are
+    spread over the sequence because a model may answer some rows faster than others.
     """
-    places = np.linspace(0, rows - 1, at_most).astype(int)
-    work(given(places[0]))  # the first call of a library takes longer
+    places = np.linspace(0, len(given) - 1, at_most).astype(int)
+    work(given[places[0]])  # the first call of a library takes longer
     spent: list[float] = []
     for place in np.random.default_rng(0).permutation(places):
-        row = given(place)
+        row = given[place]
         began = clock()
         work(row)
         spent.append(clock() - began)

@@ -10,7 +10,7 @@ import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -166,11 +166,6 @@ def answers(
     return given.astype(np.int64 if n_classes else np.float64)
 
 
-def answers_to(part: Part, model: Estimator, descriptor: EstimatorDescriptor, n_classes: int) -> npt.NDArray[Any]:
-    """Return the predictions of `model` for the rows of a set, checked by :func:`answers`."""
-    return answers(model, features_of(part, descriptor), descriptor.name, n_classes, part.y.shape[1:])
-
-
 @dataclass(frozen=True)
 class Choice:
     """Parameters and mean filter (over `k` + 1 rows) that were chosen, and their score on validation data."""
@@ -189,22 +184,35 @@ def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
     return one.X
 
 
-def select(
-    descriptor: EstimatorDescriptor,
-    given: Mapping[str, Any],
-    build: Build,
-    data: Dataset,
-    protocol: ProtocolSpec,
-    assignment: Assignment,
-    metric: Metric,
-    counts: Counter[str],
-) -> Choice | None:
+@dataclass(frozen=True)
+class Configured:
+    """An estimator, with all that is needed to fit it to the folds of a cell and to score its answers."""
+
+    descriptor: EstimatorDescriptor
+    build: Build
+    params: Mapping[str, Any]
+    """Parameters set by the user, which are not searched."""
+    fit_params: Mapping[str, Callable[[Part], Any]]
+    """Further arguments of the estimator's ``fit``: by name, the function from a training set to the argument."""
+    metric: Metric
+    events: EventRules | None
+    """Rules for alarms, of an event detection task."""
+    clock: Clock
+    counts: Counter[str]
+    """Counts of rows left out and of fits with a warning, which are added to."""
+
+    def answers_to(self, part: Part, model: Estimator, n_classes: int) -> npt.NDArray[Any]:
+        """Return the predictions of `model` for the rows of a set, checked by :func:`answers`."""
+        return answers(model, features_of(part, self.descriptor), self.descriptor.name, n_classes, part.y.shape[1:])
+
+
+def select(estimator: Configured, data: Dataset, protocol: ProtocolSpec, assignment: Assignment) -> Choice | None:
     """Choose the estimator's parameters and mean filter from its grid for one fold; None if there is nothing to choose.
 
-    Parameters `given` by the user are not searched, and the test rows of `assignment` are not used. Fits with a
-    warning are counted in `counts`.
+    Parameters set by the user are not searched, and the test rows of `assignment` are not used.
     """
-    grid = {name: values for name, values in descriptor.grid.items() if name not in given}
+    descriptor, metric = estimator.descriptor, estimator.metric
+    grid = {name: values for name, values in descriptor.grid.items() if name not in estimator.params}
     if not grid and len(descriptor.window_grid) <= 1:
         return None
     gap = max(descriptor.window_grid)
@@ -213,10 +221,8 @@ def select(
     pairs = []
     for learn, held_out in masks:
         try:
-            train, other = (
-                keep(data, protocol, rows, what, Counter())
-                for rows, what in ((learn, "training"), (held_out, "validation"))
-            )
+            train = keep(data, protocol, learn, "training", Counter())
+            other = keep(data, protocol, held_out, "validation", Counter())
         except DataError:
             continue  # one inner set without rows is no reason against the others
         if train.labelled.any() and other.labelled.any():
@@ -233,30 +239,17 @@ def select(
     tried: list[Choice] = []
     for k in descriptor.window_grid:
         filtered = [[part(rows, scale, k) for rows, scale in pair] for pair in pairs]
+        truth = np.concatenate([check.y for _, check in filtered])
         for values in itertools.product(*grid.values()):
-            params = {**given, **dict(zip(grid, values, strict=True))}
-            truth, answered = [], []
+            params = {**estimator.params, **dict(zip(grid, values, strict=True))}
+            answered = []
             for learned, check in filtered:
-                model = build(params)
-                fit(model, features_of(learned, descriptor), learned.y, descriptor.name, counts)
-                truth.append(check.y)
-                answered.append(answers_to(check, model, descriptor, n_classes))
-            score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
-            tried.append(Choice(params, k, score))
+                model = estimator.build(params)
+                fit(model, features_of(learned, descriptor), learned.y, descriptor.name, estimator.counts)
+                answered.append(estimator.answers_to(check, model, n_classes))
+            tried.append(Choice(params, k, metric.of(truth, np.concatenate(answered), n_classes)))
     best_of = min if lower_is_better(metric.name) else max
     return best_of(tried, key=lambda candidate: candidate.score)  # of equals the first
-
-
-@dataclass(frozen=True)
-class Configured:
-    """An estimator: its descriptor, the function that makes it, and the parameters that the user has set."""
-
-    descriptor: EstimatorDescriptor
-    build: Build
-    params: Mapping[str, Any] = field(default_factory=dict)
-    """Parameters set by the user, which are not searched."""
-    fit_params: Mapping[str, Callable[[Part], Any]] = field(default_factory=dict)
-    """Further arguments of the estimator's ``fit``: by name, the function from a training set to the argument."""
 
 
 @dataclass(frozen=True)
@@ -293,16 +286,14 @@ class AnsweredFold:
     """Scored test recordings of an event detection task, each with the fold's threshold; else empty."""
 
 
-def fitted_fold(
-    estimator: Configured, data: TaskData, assignment: Assignment, metric: Metric, counts: Counter[str], clock: Clock
-) -> FittedFold:
+def fitted_fold(estimator: Configured, data: TaskData, assignment: Assignment) -> FittedFold:
     """Choose parameters and mean filter on validation data, then fit the estimator to the training set of a fold."""
-    descriptor, made = estimator.descriptor, data.data
+    descriptor, made, clock = estimator.descriptor, data.data, estimator.clock
     began = clock()
-    choice = select(descriptor, estimator.params, estimator.build, made, data.rules, assignment, metric, counts)
+    choice = select(estimator, made, data.rules, assignment)
     search_s = clock() - began
     k = choice.k if choice else descriptor.window_grid[0]
-    fold = prepared(assignment, made, data.rules, k, counts)
+    fold = prepared(assignment, made, data.rules, k, estimator.counts)
     for what, rows in (("training", fold.train), ("test", fold.test)):
         if len(rows) == 0:
             raise DataError(f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another split.")
@@ -317,31 +308,25 @@ def fitted_fold(
     more = {name: of(fold.train) for name, of in estimator.fit_params.items()}
     model = estimator.build(choice.params if choice else {})
     began = clock()
-    fit(model, X, fold.train.y, descriptor.name, counts, **more)
+    fit(model, X, fold.train.y, descriptor.name, estimator.counts, **more)
     return FittedFold(fold, model, choice, k, {"search_s": search_s, "fit_s": clock() - began})
 
 
-def answered_fold(
-    fitted: FittedFold,
-    data: TaskData,
-    descriptor: EstimatorDescriptor,
-    metric: Metric,
-    rules: EventRules | None,
-    number: int,
-    clock: Clock,
-) -> AnsweredFold:
+def answered_fold(estimator: Configured, data: TaskData, fitted: FittedFold, number: int) -> AnsweredFold:
     """Compute and score a model's answers to its fold; keep those to validation and training rows of a single fold."""
-    fold, made = fitted.fold, data.data
+    fold, made, rules = fitted.fold, data.data, estimator.events
     n_classes = 0 if rules else len(made.classes)
-    began = clock()
-    predicted = answers_to(fold.test, fitted.model, descriptor, n_classes)
-    predict_s = clock() - began
-    given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {"test": (fold.test, predicted)}
-    if fold.validation is not None and len(fold.validation):
-        given["validation"] = fold.validation, answers_to(fold.validation, fitted.model, descriptor, n_classes)
     single = len(data.assignments) == 1
+    parts: dict[Role, Part | None] = {"test": fold.test, "validation": fold.validation}
     if single and not made.classes:
-        given["train"] = fold.train, answers_to(fold.train, fitted.model, descriptor, 0)
+        parts["train"] = fold.train
+    given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {}
+    spent_s = []
+    for role, rows in parts.items():
+        if rows is not None and len(rows):
+            began = estimator.clock()
+            given[role] = rows, estimator.answers_to(rows, fitted.model, n_classes)
+            spent_s.append(estimator.clock() - began)
     detected: Sequence[Scored] = ()
     if rules is None:
         sets: dict[Role, Answers] = {role: _rows(*one, made, number) for role, one in given.items()}
@@ -355,7 +340,7 @@ def answered_fold(
             for role, several in scored.items()
             if role == "test" or single
         }
-    scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
+    scores = {role: estimator.metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
     untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []
     return AnsweredFold(
         name=fold.name,
@@ -364,7 +349,7 @@ def answered_fold(
         validation=fitted.choice.score if fitted.choice else scores.get("validation"),
         sizes=(len(fold.train), len(sets["test"])),
         untrained=tuple(made.classes[int(one)] for one in untrained),
-        spent={**fitted.spent, "predict_s": predict_s, "batch_rows": len(fold.test)},
+        spent={**fitted.spent, "predict_s": spent_s[0], "batch_rows": len(fold.test)},
         sets=sets if single else {"test": sets["test"]},
         detected=detected,
     )

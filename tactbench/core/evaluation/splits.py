@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -143,19 +142,18 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
 
 def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
     """Raise NotApplicable if a protocol on the first rows of recordings cannot test them for leaks."""
-    asks = f"Protocol {FIRST_FRAME.name!r} tests if the answer can be predicted from a recording's first row alone; "
-    why, hint = "", "Compare with split `shuffled` instead."
-    changing = next((one for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
+    changing = next((one.meta.name for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
+    alone = all(len(table.row) == 1 for table in data.tables)
     if changing is not None:
-        why = f"the answer of task {task.name!r} changes within recording {changing.meta.name!r}"
-    elif not any(table.labelled[:1].any() for table in data.tables):
-        why = f"the first row of no recording has an answer to task {task.name!r}"
-    elif all(len(table.row) == 1 for table in data.tables):
-        why = "each of these recordings is one reading"
-    elif split == "in-session":
-        why, hint = "split 'in-session' tests the end of every recording", "Use a split that keeps recordings whole."
-    if why:
-        raise NotApplicable(f"{asks}{why}.", hint=hint)
+        why = f"the answer of task {task.name!r} changes within recording {changing!r}"
+    elif split == "in-session" or alone or not any(table.labelled[:1].any() for table in data.tables):
+        why = "no first row of a longer recording is tested here"
+    else:
+        return
+    raise NotApplicable(
+        f"Protocol {FIRST_FRAME.name!r} tests if a recording's first row alone tells the answer; {why}.",
+        hint="Compare with split `shuffled` instead, or use a split that keeps recordings whole.",
+    )
 
 
 def _can(name: str, data: Dataset) -> bool:
@@ -177,17 +175,6 @@ def used_rows(assignments: Sequence[Assignment]) -> Mask:
     """Return a mask of the rows that are in the training, validation or test set of at least one fold."""
     sets = [mask for one in assignments for mask in (one.train, one.test, one.validation) if mask is not None]
     return np.asarray(np.logical_or.reduce(sets))
-
-
-def without_part(data: Dataset, split: str, used: Mask) -> dict[str, int]:
-    """Return numbers of recordings that no fold uses, by role, as texts; empty for few-shot splits, by design."""
-    if shots(split) is not None:
-        return {}
-    unused = [meta.role for meta, mask in zip(data.metas, data.parted(used), strict=True) if not mask.any()]
-    return {
-        f"recordings {f'of role {role}' if role else 'without a role'} that take no part in split {split}": count
-        for role, count in Counter(unused).items()
-    }
 
 
 def training_sessions(data: Dataset) -> list[str]:

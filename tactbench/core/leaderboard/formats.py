@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,17 +12,14 @@ from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import WHOLE, View, document, grid
-from tactbench.core.spec.row import JSON_KEYS, NESTED, OF_REPLICATES
+from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
 from tactbench.core.tables import terminal
 from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex as latex_of
 from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text import json_text
 
-SUFFIXES = {
-    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
-    ".txt": "table",
-}  # fmt: skip
+SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table"}
 """Output format by suffix of the file."""
 _IN_A_PAPER = ("place", "sensor", "estimator", "score", "notes", "interval", "range", "against reference", "published")
 
@@ -46,27 +41,16 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     ----------
     view, width
         Columns and width [characters] of formats for people; formats for programs hold all columns.
-
-    Raises
-    ------
-    UsageError
-        If the library for Parquet or Excel files is not installed.
     """
-    if shape in ("parquet", "xlsx"):
-        try:
-            return parquet(table) if shape == "parquet" else xlsx(table)
-        except ImportError as error:
-            hint = f"Install it with `pip install 'tactbench[{shape}]'`."
-            raise UsageError(f"A library for this format cannot be imported: {error}.", hint=hint) from error
     if shape == "table":
-        return terminal.plain_text(document(table, view), width).encode("utf-8", "backslashreplace")
-    if shape == "md":
+        text = terminal.plain_text(document(table, view), width)
+    elif shape == "md":
         text = markdown([*document(table, view), *([table.footer] if table.footer else [])])
     elif shape == "latex":
         text = latex(table, view)
     else:
-        text = csv_text(*flat_records(table)) if shape == "csv" else json_array(table)
-    return text.encode("utf-8", "replace")
+        text = csv_of(table) if shape == "csv" else json_array(table)
+    return text.encode("utf-8", "backslashreplace")
 
 
 def write_tables(table: Table, folder: Path) -> None:
@@ -102,44 +86,13 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
-def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
-    """Return column names and lines for formats with one value in each field; lists and mappings are JSON text."""
+def csv_of(table: Table) -> str:
+    """Return a table as CSV with one line for each record: all keys, and the texts shown in columns ``shown_…``."""
     names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
-    return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
-
-
-def _flat(key: str, value: Any) -> Any:
-    if key in NESTED:
-        return json_text(value)
-    return visible(value) if isinstance(value, str) else value
+    return csv_text(names, ([*row.values(), *shown.values()] for row, shown in records(table)))
 
 
 def json_array(table: Table) -> str:
     """Return a table as a JSON array with one line for each record: all keys, and the texts shown in ``shown``."""
     lines = (json_text(values | {"shown": shown}) for values, shown in records(table))
     return "[\n" + ",\n".join(lines) + "\n]\n"
-
-
-def parquet(table: Table) -> bytes:
-    """Return a table's records as a Parquet file; lists and mappings are JSON text. Raises ImportError."""
-    import pyarrow
-    from pyarrow.parquet import write_table
-
-    names, lines = flat_records(table)
-    out = io.BytesIO()
-    write_table(pyarrow.table(dict(zip(names, map(list, zip(*lines, strict=True)), strict=True))), out)
-    return out.getvalue()
-
-
-def xlsx(table: Table) -> bytes:
-    """Return a table's records as the sheet of an Excel workbook. Raises ImportError."""
-    from openpyxl import Workbook
-
-    book = Workbook(write_only=True)
-    sheet = book.create_sheet("leaderboard")
-    names, lines = flat_records(table)
-    for line in [names, *lines]:
-        sheet.append([None if value in (math.inf, -math.inf) else value for value in line])
-    out = io.BytesIO()
-    book.save(out)
-    return out.getvalue()

@@ -5,7 +5,7 @@ Each set of ends has its own result folder, such as ``OUT/assumptions/placement_
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, permutations, product
 from typing import Any
@@ -117,20 +117,18 @@ def _order_text(rows: Mapping[str, Row]) -> str:
 
 def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
     """Return the sensitivities computed in a folder, by (task, protocol, split, rig, estimator)."""
+    folders = [path.parent for path in sorted((store.folder / FOLDER).glob("*=*/cells"))]
+    variants = {folder.name: _questions(Store(folder)) for folder in folders}
+    stated = _questions(store) if folders else {}
+    own = {key: {name: rows[key] for name, rows in variants.items() if key in rows} for key in stated}
+    return {key: Sensitivity(stated[key], found) for key, found in own.items() if found}
 
-    def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
-        answers = (row for row in rows if not row["is_baseline"])
-        return grouped(answers, lambda row: (row["task"], row["protocol"], row["split"] or "", hardware_name(row),
-                                             answer_name(row)))  # fmt: skip
 
-    folders = sorted((store.folder / FOLDER).glob("*=*/cells"))
-    variants = {path.parent.name: questions(Store(path.parent).rows()) for path in folders}
-    found = {}
-    for key, stated in questions(store.rows() if folders else ()).items():
-        own = {name: rows[key] for name, rows in variants.items() if key in rows}
-        if own:
-            found[key] = Sensitivity(stated, own)
-    return found
+def _questions(store: Store) -> dict[tuple[str, ...], list[Row]]:
+    def question(row: Row) -> tuple[str, ...]:
+        return row["task"], row["protocol"], row["split"] or "", hardware_name(row), answer_name(row)
+
+    return grouped((row for row in store.rows() if not row["is_baseline"]), question)
 
 
 def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:

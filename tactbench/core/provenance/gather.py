@@ -1,4 +1,4 @@
-"""Provenance of a run: its software and machine, gathered once and summarised below tables.
+"""Provenance of a run: its software and machine, gathered once and shown below tables.
 
 A provenance contains no time, path, or name of a person or host: equal circumstances give equal provenance.
 """
@@ -10,7 +10,7 @@ import os
 import platform
 import re
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -76,18 +76,3 @@ def _commit(folder: Path) -> str:
     with suppress(OSError, subprocess.SubprocessError):
         return subprocess.check_output(command, stderr=subprocess.DEVNULL, text=True).strip()
     return ""
-
-
-def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences on the software and machines of several provenances, without repetitions."""
-    return tuple(dict.fromkeys(text for one in several for text in _sentences(one)))
-
-
-def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    commit = f" ({one['commit']})" if one["commit"] else ""
-    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
-    made_with = f"Python {one['python']}, {libraries}, BLAS threads: {one['threads']}"
-    yield f"tactbench {one['tactbench']}{commit}, {made_with}."
-    for plugin in one["plugins"]:
-        yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores."

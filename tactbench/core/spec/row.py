@@ -162,7 +162,7 @@ class RestsOn(_Section):
     """figures of events by name; times are in the unit in the name"""
     recordings: list[str] = []
     replicates: dict[str, Any] = {}
-    """sums of the primary metric over each replicate; see replicate_sums"""
+    """sums of the primary metric over each replicate; see tactbench.core.evaluation.interval"""
 
 
 class Evaluated(RestsOn, Cost, Scored):

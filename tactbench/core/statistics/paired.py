@@ -8,9 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import influences, own_scores, student_quantile, two_sided_p
+from tactbench.core.evaluation.interval import influences, own_scores, student_quantile, tables_of, two_sided_p
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
-from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.row import lower_is_better
 from tactbench.core.statistics.replicates import FEWEST, counted

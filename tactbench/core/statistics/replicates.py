@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import comb
 from operator import itemgetter
 from statistics import median, median_low
@@ -155,22 +154,19 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     found = {**first, **{key: timed[key] for key in Cost.model_fields if key in timed}}
     for key in [key for key in _MEDIANS if key in first]:
         found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
-    level = 0.0
     for key, prefix in _INTERVALS.items():
         if f"{prefix}ci_low" in first:
             values = [row.get(key) for row in done]
-            known = None if None in values else median_interval(values)
-            found |= {f"{prefix}ci_{end}": getattr(known, end, None) for end in ("low", "high")}
-            level = known.level if known else level
+            low, high = (None if None in values else median_interval(values)) or (None, None)
+            found |= {f"{prefix}ci_low": low, f"{prefix}ci_high": high}
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     events = [row.get("events") or {} for row in done]
     alarms: list[Any] = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
-    covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
         **({"reference_scores": [row["reference_score"] for row in done]} if "reference_score" in first else {}),
-        "ci_method": f"order statistics of {len(done)} replicates{covers}" if level else "",
+        "ci_method": f"order statistics of {len(done)} replicates" if len(done) >= FEWEST else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
@@ -253,17 +249,7 @@ def _texts(done: Sequence[Row], key: str) -> list[str]:
     return [text if n == len(done) else f"in {n} of {len(done)} replicates: {text}" for text, n in counts.items()]
 
 
-@dataclass(frozen=True)
-class MedianInterval:
-    """Confidence interval of a median."""
-
-    low: float
-    high: float
-    level: float
-    """Coverage of the interval: 0.95, or 0.9375, that of the whole range, for five replicates."""
-
-
-def median_interval(values: Sequence[Any]) -> MedianInterval | None:
+def median_interval(values: Sequence[Any]) -> tuple[float, float] | None:
     """Return the 95 % interval of the median of the distribution of `values`; None for fewer than five values.
 
     Notes
@@ -271,7 +257,7 @@ def median_interval(values: Sequence[Any]) -> MedianInterval | None:
     The interval from the k-th smallest to the k-th largest of n values covers the median with probability
     ``1 - 2 P(B < k)``, B binomial with n and 1/2, for any continuous distribution. The ends are interpolated between
     the two k whose probabilities enclose 95 % [1]_: the coverage is 95 % for smooth distributions, and for others at
-    least :func:`least_coverage`. The range of five values covers the median in only 93.75 %, which is then the level.
+    least :func:`least_coverage`. The range of five values covers the median in only 93.75 %.
 
     References
     ----------
@@ -285,12 +271,12 @@ def median_interval(values: Sequence[Any]) -> MedianInterval | None:
     k = _depth(n)
     held, next_held = _coverage(n, k), _coverage(n, k + 1)
     if held <= LEVEL:
-        return MedianInterval(ordered[0], ordered[-1], held)
+        return ordered[0], ordered[-1]
     share = (held - LEVEL) / (held - next_held)
     weight = (n - k) * share / (k + (n - 2 * k) * share)
     low = ordered[k - 1] + weight * (ordered[k] - ordered[k - 1])  # of equal values exactly these
     high = ordered[n - k] - weight * (ordered[n - k] - ordered[n - k - 1])
-    return MedianInterval(low, high, LEVEL)
+    return low, high
 
 
 def least_coverage(n: int) -> float:

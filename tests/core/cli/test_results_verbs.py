@@ -33,10 +33,7 @@ def test_every_format_goes_to_a_file_named_for_it(ran):
     for suffix, shape in ((".md", "md"), (".csv", "csv"), (".json", "json"), (".tex", "latex"), (".txt", "table")):
         ran("leaderboard", "out", "--to", f"table{suffix}")
         assert (ran.folder / f"table{suffix}").read_text() == ran("leaderboard", "out", "--format", shape).stdout
-    for suffix, begins in ((".xlsx", b"PK"), (".parquet", b"PAR1")):
-        ran("leaderboard", "out", "--to", f"table{suffix}")
-        assert (ran.folder / f"table{suffix}").read_bytes().startswith(begins)
-    assert ".xlsx" in ran("leaderboard", "out", "--to", "table.xls", code=2).stderr
+    assert ".csv" in ran("leaderboard", "out", "--to", "table.xls", code=2).stderr
     assert not (ran.folder / "table.xls").exists()
 
 

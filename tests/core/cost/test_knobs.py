@@ -1,20 +1,12 @@
 """What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import measure, quick_estimator, settings_of
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
 from tactbench.core.cost.precision import precise
-from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import stated_delay_ms
-from tactbench.core.evaluation.folds import load_task
-from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.figures.style import styled
@@ -109,29 +101,21 @@ def test_the_figure_has_a_path_for_each_knob_and_a_panel_for_each_sensor(known):
         assert noise.get_ydata()[0] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("name", ["deployable@every=3,k=4", "deployable@every=3", "deployable@k=4"])
-def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, name):
-    task, rules = registry.tasks["force"].spec, protocol_called(name)
-    paths = sorted(shelf.glob("*.h5"))
-    plain, made = (load_task(task, paths, one, "session") for one in ("deployable", name))
-    assert np.array_equal(made.X, np.concatenate([table.X[:: rules.every] for table in plain.data.tables]))
-    k = 0 if rules.k is None else rules.k
-    fold = prepared(made.assignments[0], made.data, made.rules, k, Counter())
-    rows = made.X[made.folds[0][1]]
-    train = made.X[made.folds[0][0]]
-    scaled = (rows - train.mean(axis=0)) / train.std(axis=0)
-    assert fold.test.X[-1] == pytest.approx(scaled[len(scaled) - k - 1 :].mean(axis=0))
-    parts, _ = stated_delay_ms(made, registry.estimators["ols"], k)
-    assert parts["sampling"] == pytest.approx(10.0 * rules.every)
-    assert parts["window"] == pytest.approx(10.0 * rules.every * k / 2)
-
-
-def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
-    task = registry.tasks["slip-sequence"].spec
-    knobs = {one.knob for one in settings_of(task, [registry.estimators["forest"]], "deployable")}
-    assert "window k" not in knobs
-    with pytest.raises(NotApplicable, match="single samples"):
-        load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+def test_settings_are_the_defaults_and_values_on_either_side(registry):
+    force, forest = registry.tasks["force"].spec, registry.estimators["forest"]
+    values = {}
+    for one in [
+        *settings_of(force, [forest], "deployable"),
+        *simulations_of(registry.rigs["twin"], forest, "karl2016"),
+    ]:
+        values.setdefault(one.knob, []).append(one.value)
+    of_recordings = settings_of(registry.tasks["slip-sequence"].spec, [forest], "deployable")
+    assert "window k" not in {one.knob for one in of_recordings}
+    assert values == {
+        "trees": ["3", "10", "30", "100", "300", "500"], "window k": ["0", "2", "5", "10", "20", "40"],
+        "every n-th sample": ["1", "2", "5", "10", "20"], "training sessions": ["1", "2", "5", "10"],
+        "estimator": ["forest"], "rung": list(registry.rigs["twin"].rungs[:-1]), "tolerance": ["3", "1", "0.3"],
+    }  # fmt: skip
 
 
 def test_the_quick_estimator_is_linear_and_searches_nothing(registry):

@@ -9,7 +9,6 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.samples import Quality
 from tactbench.plugin import Block, ChannelSpec, StreamSpec, Summary
 
 from .made import evaluated, force_task, label_task, ramp, record, sensor_of, sessions, write
@@ -90,14 +89,6 @@ def test_samples_that_a_faster_stream_lacks_are_left_out_of_it_and_counted(tmp_p
     data = load_dataset(both, [path])
     assert {text.split()[2]: n for text, n in data.counts.items()} == {"fast": 4, "out": 1}
     assert [(len(one.data), round(one.rate_hz)) for one in data.tables[0].readings] == [(9, 100), (196, 2000)]
-
-
-def test_flagged_samples_are_kept_and_counted(tmp_path):
-    quality = np.zeros((50, 3), dtype=np.uint8)
-    quality[3:10, 0], quality[20, 1] = Quality.SATURATED, Quality.SUSPECT
-    data = load_dataset(force_task(), sessions(tmp_path, "a", 50, quality=quality))
-    assert {text.split()[0]: n for text, n in data.counts.items()} == {"saturated": 7, "suspect": 1}
-    assert len(data.tables[0].row) == 50
 
 
 def test_time_that_does_not_run_forward_is_refused(tmp_path):

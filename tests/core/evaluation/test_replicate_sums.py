@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from tactbench.core.evaluation.interval import tables_of
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.replicate_sums import tables_of
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record
 

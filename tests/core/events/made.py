@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from tactbench.core.events.alarms import GroundTruth
-from tactbench.core.events.curve import ScoredRecording
+from tactbench.core.events.alarms import GroundTruth, ScoredRecording
 from tactbench.core.spec.events import AlarmPolicy
 
 MS = 1_000_000

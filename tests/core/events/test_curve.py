@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.alarms import alarms, score_events
-from tactbench.core.events.curve import threshold_curve
+from tactbench.core.events.alarms import alarms, score_events, threshold_curve
 from tests.core.events.made import policies, scored_recordings
 
 
@@ -27,7 +26,7 @@ def test_the_area_is_the_recall_of_operating_points_integrated_over_their_bounds
     curve = threshold_curve(recordings, rules)
     rate = curve.scores.false_alarms_per_minute
     if np.isnan(rate).any() or curve.scores.latency_s.shape[1] == 0:
-        with pytest.raises(DataError, match="operating point"):
+        with pytest.raises(DataError, match="No threshold"):
             curve.found_share(most)
         return
     edges = np.unique([0.0, *rate[rate < most], most])  # between two of them the best threshold stays
@@ -43,7 +42,7 @@ def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, boun
     curve = threshold_curve(recordings, rules)
     rate = curve.scores.false_alarms_per_minute
     if np.isnan(rate).any() or curve.scores.latency_s.shape[1] == 0:
-        with pytest.raises(DataError, match="operating point"):
+        with pytest.raises(DataError, match="No threshold"):
             curve.operating_point(bound)
         return
     chosen = curve.at(curve.operating_point(bound))
