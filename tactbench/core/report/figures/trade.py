@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.cost.knobs import TIMES
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
-from tactbench.core.report.figures.style import GREY, LINES, MARKERS, PAGE_IN, legend, panels, save, styled
+from tactbench.core.report.figures.style import MARKERS, legend, panels, save, styled
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
@@ -31,22 +31,20 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
     """
     shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
     times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
-    figure, axes = panels(1, len(times), 3.4, width_in=PAGE_IN, sharey=True)
+    figure, axes = panels(1, len(times), wide=True, sharey=True)
     for here, time in zip(axes[0], times, strict=True):
         own = [one for one in shown if TIMES[one["knob"]] == time]
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
             place = list(TIMES).index(knob)
-            line = "" if knob == "estimator" else "-"
-            style: dict[str, Any] = {"color": LINES[place % len(LINES)], "linewidth": 0.6}
+            style = MARKERS[place] + ("" if knob == "estimator" else "-")
             across, upwards = [one[time] for one in path], [one["score"] for one in path]
-            here.plot(across, upwards, MARKERS[place] + line, markersize=4, label=knob, **style)
+            here.plot(across, upwards, style, color=f"C{place}", label=knob)
             for one in path:
-                here.annotate(visible(str(one["value"])), (one[time], one["score"]), (3, 3), fontsize=5.5,
-                              textcoords="offset points", color=style["color"])  # fmt: skip
+                here.annotate(f" {visible(str(one['value']))}", (one[time], one["score"]), color=f"C{place}")
                 if one["ci_low"] is not None and one["ci_high"] is not None:
-                    here.vlines(one[time], one["ci_low"], one["ci_high"], **style)
+                    here.vlines(one[time], one["ci_low"], one["ci_high"], color=f"C{place}")
         if known["trivial"] is not None:
-            here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
+            here.axhline(known["trivial"], color="grey", ls="--", label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
         # 1, 2, 5, 10 … instead of powers of ten.
         here.xaxis.set_major_formatter("{x:g}")
