@@ -181,7 +181,7 @@ def all_but(check):
     wanted, needs = [check], {one.name: one.needs for one in CHECKS}
     for name in wanted:
         wanted += needs[name]
-    return {one.name for one in CHECKS if one.mode != "recording"} - set(wanted)
+    return {one.name for one in CHECKS} - set(wanted)
 
 
 def report_of(registry, kind, name, without=()):
