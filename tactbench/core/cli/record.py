@@ -36,7 +36,7 @@ from tactbench.core.tables.text import command_line
               help="Force profile with its parameters: ramp:force=5,duration=60 (the default), "
                    "sine:mean=2,frequency=0.5.")  # fmt: skip
 @SIMULATION
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
 @click.option("--live", is_flag=True, help="Show force, planned force and rates while recording.")

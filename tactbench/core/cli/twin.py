@@ -32,7 +32,7 @@ def command() -> None:
 @command.command(name="explain")
 @click.option("--sensor", "sensor_name", required=True, metavar="NAME", help="Sensor.")
 @click.option("--task", "task_name", required=True, metavar="NAME", help="Task whose scenes are planned.")
-@click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
+@click.option("--rounds", type=click.IntRange(min=0), default=5, metavar="N",
               help="Number of recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
 @EFFECTS
 @format_option("table", "json", "csv")
