@@ -53,3 +53,4 @@ def test_checks_are_listed_without_a_name(verbs):
     assert {"driver-reads", "it-learns"} <= {one["check"] for one in listed}
     assert all(one["why"].endswith(".") and one["do"].endswith(".") for one in listed)
     assert "NAME" in verbs("check", code=2).stderr
+    assert "sensors" in verbs("check", "force", "--recording", __file__, code=2).stderr
