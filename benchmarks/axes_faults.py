@@ -35,6 +35,7 @@ from tactbench.plugin.devices import (
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 RAILS = ("joint-1", "joint-2", "joint-3")
 WAY_M, POINTS = 1e-3, 8
@@ -61,8 +62,8 @@ class Machine(faults.Pressed):
         own = {"motor": self.devices._devices["motor"], "force": self.devices._devices["force"]}
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
-            self.rails[name] = MotorEmulator(None, rng, faults.build_options(), faults=given.get(name, []))
-            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())), 115200)
+            self.rails[name] = MotorEmulator(None, rng, FaulhaberOptions(**RAIL), faults=given.get(name, []))
+            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())))
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock
 
@@ -147,7 +148,7 @@ def schedule(setting: Any, drawn: tuple[tuple[str, float], ...], obstacle_m: flo
         elif what == "hot":
             given.setdefault(axis, []).append(MotorFault.parse(f"motor-fault:start_s={at_s}"))
         elif what == "answers late":
-            given.setdefault(axis, []).append(MotorFault.parse(f"late-answers:start_s={at_s}"))
+            given.setdefault(f"{axis}_link", []).append(LinkFault.parse(f"late:start_s={at_s},delay_s=0.25"))
         elif (kind := faults.KINDS[name]).text:
             text = kind.text.format(start=at_s, end=at_s + 0.3, four=at_s + 4.5e-3)
             parse = faults.DatagramFault.parse if kind.where == "force" else LinkFault.parse

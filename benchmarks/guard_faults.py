@@ -155,7 +155,7 @@ class Pressed:
         )
         self.force.faults = faults.get("force", [])
         devices = {
-            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
+            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ()))),
             "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
         }
         self.devices = RealTimeDevices(devices) if setting.time == "real" else EmulatedDevices(devices)
@@ -164,7 +164,7 @@ class Pressed:
     @property
     def position_m(self) -> float:
         """Of the motor, as its drive counts it."""
-        return float(self.motor.drive.position_m) + RETREAT_M
+        return float(self.motor.position_m)
 
     @property
     def force_n(self) -> float:
@@ -178,7 +178,7 @@ class Pressed:
         return max((place for at_s, place in self._places if at_s >= since_s), default=-math.inf)
 
     def _load(self, place_m: float) -> float:
-        return self.setting.stiffness_n_m * max(0.0, place_m + RETREAT_M - SKIN_M)
+        return self.setting.stiffness_n_m * max(0.0, place_m - SKIN_M)
 
     def settings(self) -> dict[str, dict[str, Any]]:
         """Return the options of both devices."""
@@ -310,7 +310,7 @@ KINDS: dict[str, Kind] = {
     "force held up": Kind("force_link", FORCE_UNKNOWN, "late:start_s={start},delay_s=0.05"),
     "motor hot": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start}", out=False),
     "motor hot for a while": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start},end_s={end}", out=False),
-    "motor answers late": Kind("motor", SILENT, "late-answers:start_s={start}"),
+    "motor answers late": Kind("motor_link", SILENT, "late:start_s={start},delay_s=0.25"),
     "motor's lines garbled": Kind(
         "motor", SILENT | {Trigger.COMMANDS_REFUSED},
         "garbled-line:start_s={start},every=11",

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 from tactbench.core.errors import LinkError, LinkTimeout
 from tactbench.links.byte_link import ByteLink
@@ -172,9 +173,7 @@ class SpiBridge(SpiLink):
         try:
             self._greet(wake_s)
             reply = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
-            if len(reply.payload) != SETUP.size:
-                raise self._nonsense(reply)
-            self.speed_hz, _ = SETUP.unpack(reply.payload)
+            self.speed_hz, _ = self._unpacked(SETUP.format, reply)
         except BaseException:
             self._bytes.close()
             raise
@@ -195,10 +194,9 @@ class SpiBridge(SpiLink):
                         f"{self.address}: no SPI bridge answered within {wake_s:g} s.",
                         hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
                     ) from error
-        if len(hello.payload) < HELLO.size:
-            raise self._nonsense(hello)
-        self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
-        self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
+        layout = f"{HELLO.format}{len(hello.payload) - HELLO.size}s"
+        self.firmware, self._largest, self.holds, self.select_lines, name = self._unpacked(layout, hello)
+        self.name = name.decode("ascii", "replace")
 
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
         """Send a request other than a batch, and return the reply; other frames are dropped."""
@@ -254,9 +252,7 @@ class SpiBridge(SpiLink):
                 lengths = self._waiting.pop(number)
                 if number == frame.number:
                     break
-            if len(frame.payload) != BEGIN.size + sum(lengths):
-                raise self._nonsense(frame)
-            begun_us, *data = struct.unpack("<I" + "".join(f"{length}s" for length in lengths), frame.payload)
+            begun_us, *data = self._unpacked(BEGIN.format + "".join(f"{length}s" for length in lengths), frame)
             return SpiReply(frame.number, tuple(data), t_ns, begun_us)
 
     def abandon(self) -> None:  # noqa: D102
@@ -269,11 +265,15 @@ class SpiBridge(SpiLink):
             hint="See the errors of the bridge in docs/links.md.",
         )
 
-    def _nonsense(self, frame: Frame) -> LinkError:
-        return LinkError(
-            f"{self.address}: the bridge's reply to request {frame.number} has a wrong length: {len(frame.payload)}.",
-            hint="Check that the bridge runs the firmware of docs/links.md.",
-        )
+    def _unpacked(self, layout: str, frame: Frame) -> tuple[Any, ...]:
+        try:
+            return struct.unpack(layout, frame.payload)
+        except struct.error as error:
+            raise LinkError(
+                f"{self.address}: the bridge's reply to request {frame.number} has a wrong length: "
+                f"{len(frame.payload)}.",
+                hint="Check that the bridge runs the firmware of docs/links.md.",
+            ) from error
 
     def _release(self) -> None:
         self._bytes.close()

@@ -4,6 +4,9 @@ Skins, nuisances, transducers and skin states; effects, comparisons with exact s
 """
 
 from tactbench.core.plugins.interfaces import (
+    CostJob,
+    CostPoint,
+    CostStudy,
     EffectRun,
     EffectTrack,
     Explained,
@@ -22,6 +25,9 @@ from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPa
 
 __all__ = [
     "BondedLayer",
+    "CostJob",
+    "CostPoint",
+    "CostStudy",
     "Creep",
     "Dome",
     "EffectDescriptor",

@@ -9,7 +9,7 @@ from tactbench.core.evaluation.reference_floor import integrated_correlation
 from tests.core.evaluation.made import evaluated, force_task, record
 
 ROLES = ("train", "validation", "test")
-RANKED = [name for name, protocol in PROTOCOLS.items() if not protocol.probe]
+RANKED = [name for name, protocol in PROTOCOLS.items() if not protocol.first_row_only]
 """Protocols that answer where a force changes within a recording."""
 
 

@@ -151,14 +151,14 @@ def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
 
 
 @needs_pty
-def test_replies_that_do_not_come_are_a_timeout_then_a_gap_and_abandoned_leave_room(link, emulator):
-    emulator.faults.add("dropped")
+def test_replies_that_do_not_come_are_a_timeout_then_a_gap_and_abandoned_leave_room(link, emulator, monkeypatch):
+    monkeypatch.setattr(emulator, "poll", lambda now_s: emulator._due.clear() or [])
     assert link.holds == 3
     numbers = [link.send([SpiStep(b"a")]) for _ in range(3)]
     with pytest.raises(LinkTimeout):
         link.receive(0.1)
     link.abandon()
-    emulator.faults.clear()
+    monkeypatch.undo()
     assert link.send([SpiStep(b"\x01")]) == numbers[-1] + 1
     reply = link.receive(2.0)
     assert (reply.number, reply.data) == (numbers[-1] + 1, (b"\xfe",))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
+from tactbench.core.cost.precision import front
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, shots
 from tactbench.core.matrix.run import EngineChoice, run_matrix
@@ -40,7 +41,6 @@ _KEPT = (
 )  # fmt: skip
 
 Record = dict[str, Any]
-P = TypeVar("P")
 
 
 class Setting(NamedTuple):
@@ -167,18 +167,3 @@ def measure(
     about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
     shown = sign * bar if trivial else None
     return {**about, "seed": matrix.seed, "trivial": shown, "replicates": matrix.repeats, "settings": records}
-
-
-def front(points: Sequence[P], cost_of: Callable[[P], tuple[float, float]]) -> list[P]:
-    """Return the points that no other point beats in both time and error, by increasing time.
-
-    Parameters
-    ----------
-    cost_of
-        Function that returns the time and the error of a point; smaller is better for both.
-    """
-    kept: list[P] = []
-    for point in sorted(points, key=cost_of):
-        if not kept or cost_of(point)[1] < cost_of(kept[-1])[1]:
-            kept.append(point)
-    return kept

@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import Field
 
 from tactbench.core.errors import DataError, PluginContractError
-from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
 from tactbench.core.evaluation.dataset import LARGEST, Dataset, alike
 from tactbench.core.evaluation.delay import (
     CALLS_OF_P95,
@@ -28,7 +27,17 @@ from tactbench.core.evaluation.delay import (
     stated_delay_ms,
 )
 from tactbench.core.evaluation.event_answers import EventRules
-from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
+from tactbench.core.evaluation.fitting import (
+    AnsweredFold,
+    Configured,
+    FittedFold,
+    answered_fold,
+    builder,
+    features_of,
+    fitted_fold,
+    one_model_a_component,
+    routed,
+)
 from tactbench.core.evaluation.folds import TaskData, load_task
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
@@ -192,7 +201,6 @@ def _result(
     if metric.kind == "regression":
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
-            remarks.append(f"answers are vectors ({', '.join(task.target.names)}): one model per component")
         floor, no_floor = reference_floor(task, metric, data.recorded if data.window else made, tested)
         remarks.append(no_floor)
         truth = None if metric.function else true_force(task, made, tested)
@@ -242,7 +250,7 @@ def _result(
         classes=classes,
         chosen=_chosen(answered, rules),
         counts=dict(counts + Counter(left_out)),
-        dagger=data.rules.uses_test_statistics,
+        dagger=data.rules.three_sigma,
         stamps=stamps,
         findings=[*data.recorded.findings, *_groups_alike(data), *_untrained(answered)],
         tare_s=held_s or None,
@@ -284,11 +292,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
 
 
 def _of_answers(data: TaskData) -> list[str]:
-    """Return remarks on answers to whole recordings and to frames, for the report."""
-    if data.task.answer_per == "recording":
-        return [
-            f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
-        ]
+    """Return remarks on answers to frames, for the report."""
     if data.task.answer_per != "frame":
         return []
     remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]

@@ -98,8 +98,6 @@ class Dataset:
     """Files that the tables were read from, in the same order"""
     whole: bool = False
     """True if the task has one answer for each recording or frame, so that no split may cut a recording"""
-    vote: bool = False
-    """True if the answer to a recording is combined from the answers to its rows"""
 
     @property
     def labelled(self) -> Mask:
@@ -210,7 +208,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     if whole:
         tables = [_whole(table, task, target) for table in tables]
     findings = (*_in_some(seen, len(tables)), *_left_out(tables, task, target), *alike("classes", classes))
-    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole, bool(task.vote))
+    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole)
 
 
 def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:

@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.core.evaluation.dataset import Table
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
+from tactbench.core.evaluation.sets import FeatureScale, causal_mean
 from tactbench.core.evaluation.summaries import (
     frame_features,
     frame_times,
@@ -81,7 +81,7 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
         elif rules.first_row_only or (k == 0 and task.answer_per == "sample"):
             windows.append(0.0)
         elif task.answer_per == "recording":
-            windows.append(_span_s(table, task, rules, row_s))
+            windows.append(_span_s(table, task, rules))
         else:
             windows.append(None if row_s is None else row_s * k / 2)
     longest = {"sampling": _largest(sampling), "link": _largest(links), "window": _largest(windows)}
@@ -137,19 +137,12 @@ def _largest(values: Sequence[float | None]) -> float | None:
     return max(known) if len(known) == len(values) else None
 
 
-def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec, row_s: float | None) -> float | None:
-    """Return the time span [s] of the samples used for the answer to a recording; None if it is unknown."""
-    if task.vote:
-        times_s = table.time_s[asked_for(table, rules)]
-        if table.meta.clock == "none":
-            return None if row_s is None else len(times_s) * row_s
-        return float(np.ptp(times_s)) if len(times_s) else 0.0
+def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    """Return the time span [s] of the windows of a recording's summaries; None if it is unknown."""
     length = _largest([_length_s(stream) for stream in kept(table, rules)])
     if length is None:
         return None
-    scales = [1.0 if one.unit == "s" else length for one in task.summaries]
-    ends = [(one.start * scale, one.end * scale) for one, scale in zip(task.summaries, scales, strict=True)]
-    return max(end for _, end in ends) - min(start for start, _ in ends)
+    return length * (max(one.end for one in task.summaries) - min(one.start for one in task.summaries))
 
 
 def _length_s(stream: StreamReadings) -> float | None:

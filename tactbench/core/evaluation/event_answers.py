@@ -9,9 +9,8 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import slip_target
-from tactbench.core.events.alarms import alarms, displacement_at_detection, score_events
+from tactbench.core.events.alarms import alarms, score_events
 from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, threshold_curve
 from tactbench.core.samples import Answers, FloatArray, Part
 from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
@@ -20,11 +19,10 @@ from tactbench.core.spec.task import TaskSpec
 
 @dataclass(frozen=True)
 class Scored(ScoredRecording):
-    """A detector's scores of all frames of one recording, with the slip reference of that recording."""
+    """A detector's scores of all frames of one recording of a data set."""
 
     place: int
     """Index of the recording in the data set."""
-    reference: SlipReference
     threshold: float = np.inf
     """The fold's threshold, from which on a frame is active."""
 
@@ -57,7 +55,7 @@ class EventRules:
             whole = np.full(n, np.nan)
             whole[row] = score[mine]
             ends_ns = first + self.hop_ns * np.arange(n)
-            found.append(Scored(ends_ns, whole, table.slip.truth(ends_ns), place, table.slip))
+            found.append(Scored(ends_ns, whole, table.slip.truth(ends_ns), place))
         return found
 
     def choose(self, curve: ThresholdCurve | None) -> float:
@@ -96,8 +94,9 @@ class EventRules:
                     "The area under recall over false alarms is undefined: no disturbance to count false alarms in.",
                     hint="Give every fold test recordings of disturbances (label `event: disturbance`).",
                 ) from error
+        shares = np.split(found, np.cumsum([len(one.truth.event_ns) for one in several])[:-1])
         columns = []
-        for one, share in zip(several, by_recording(found, several), strict=True):
+        for one, share in zip(several, shares, strict=True):
             table, at_ns = data.tables[one.place], np.append(one.t_ns[:1], one.truth.event_ns[:, 0])
             last = np.searchsorted(np.rint(table.time_s * 1e9), at_ns, side="right") - 1
             rows = table.row[np.maximum(last, 0)]
@@ -118,11 +117,7 @@ class EventRules:
         """
         raised = [alarms(one.t_ns, one.score >= one.threshold, self.policy) for one in tested]
         scores = score_events([one.truth for one in tested], raised, self.policy)
-        late_s, displacement = compute_s or 0.0, np.zeros(0)
-        for one, late in zip(tested, by_recording(scores.latency_s, tested), strict=True):
-            onset, reference = one.truth.event_ns[:, 0], one.reference
-            moved = displacement_at_detection(onset, late + late_s, reference.t_ns, reference.displacement_m)
-            displacement = np.append(displacement, moved[np.isfinite(moved)])
+        late_s = compute_s or 0.0
         found = {
             "area up to false alarms per minute": AREA_PER_MINUTE,
             "bound of false alarms per minute": self.max_false_alarms_per_minute,
@@ -135,13 +130,7 @@ class EventRules:
             "false alarms per minute": float(scores.false_alarms_per_minute),
             "onset latency p50 ms": 1e3 * (scores.latency_percentile_s(50) + late_s),
             "onset latency p95 ms": 1e3 * (scores.latency_percentile_s(95) + late_s),
-            "displacement at detection p50 mm": 1e3 * float(np.median(displacement)) if displacement.size else np.nan,
         }
         if compute_s is not None:
             found["compute s per s of signal"] = 1e9 * compute_s / self.hop_ns
         return {name: value for name, value in found.items() if np.isfinite(value)}
-
-
-def by_recording(of_events: FloatArray, several: Sequence[Scored]) -> list[FloatArray]:
-    """Return (events,) values of the events of all recordings as one array for each recording."""
-    return np.split(of_events, np.cumsum([len(one.truth.event_ns) for one in several])[:-1])

@@ -109,14 +109,14 @@ def score_interval(
             right, asked = sums.T
         else:
             right, asked = np.trace(confusion(sums, n_classes), axis1=1, axis2=2), sums.sum(axis=1)
-        wrong = asked - right
-        if 1 - score < 1 / n and _few(wrong):
-            low, high = _few_mistakes(score, low, high, int(np.count_nonzero(wrong)), n)
-            method += f"; {np.count_nonzero(wrong)} of them with a mistake (Clopper and Pearson)"
-        if score < 1 / n and _few(right):
-            mirrored = _few_mistakes(1 - score, 1 - high, 1 - low, int(np.count_nonzero(right)), n)
-            high, low = (1 - one for one in mirrored)
-            method += f"; {np.count_nonzero(right)} of them with a right answer (Clopper and Pearson)"
+        near_0 = score < 1 / n
+        few = right if near_0 else asked - right
+        if (near_0 or 1 - score < 1 / n) and _few(few):
+            number, what = int(np.count_nonzero(few)), "right answer" if near_0 else "mistake"
+            mirrored = (1 - score, 1 - high, 1 - low) if near_0 else (score, low, high)
+            low, high = _few_mistakes(*mirrored, number, n)
+            low, high = (1 - high, 1 - low) if near_0 else (low, high)
+            method += f"; {number} of them with a {what} (Clopper and Pearson)"
     return Interval(low, high if np.isfinite(high) else None, method)
 
 

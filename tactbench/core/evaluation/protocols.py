@@ -23,23 +23,20 @@ class ProtocolSpec(Frozen):
     tare: bool = False
     """Subtract from readings the recording's own mean over the unloaded hold of its scene; see `sets.hold_s`."""
     three_sigma: bool = False
-    """Drop a sample if a feature or the reference force is over three standard deviations from the mean of its set."""
+    """Drop a sample if a feature or the reference force is over three standard deviations from the mean of its set. The
+    results are marked with a dagger, as test rows are then chosen by statistics of the test set."""
     scaled_by: Literal["each set", "training set"]
     """Data whose mean and deviation scale a set: the set itself or the training set."""
     window_over: Literal["kept samples", "consecutive samples"]
     """Samples over which the mean filter runs, never across recordings or sets."""
     roles_only: bool = False
     """True to require recordings with the roles train, validation and test, and split by these roles."""
-    uses_test_statistics: bool = False
-    """True if test data are processed by statistics of the test set; such results are marked with a dagger."""
     first_row_only: bool = False
-    """Keep only the first row of every recording; see `splits`."""
+    """Keep only the first row of every recording, to test recordings for leaks, not sensors: with every task."""
     every: int = Field(default=1, ge=1)
     """N to keep only each N-th sample from the first, as from a sensor with an N times lower sampling rate."""
     k: int | None = Field(default=None, ge=0)
     """Number of earlier samples that the mean filter includes; None to use the estimator's own or chosen number."""
-    probe: bool = False
-    """True if the protocol tests recordings for leaks, not sensors; it may then be used with every task."""
 
 
 KARL2016 = ProtocolSpec(
@@ -50,7 +47,6 @@ KARL2016 = ProtocolSpec(
     scaled_by="each set",
     window_over="kept samples",
     roles_only=True,
-    uses_test_statistics=True,
 )
 """Protocol of Karl et al. 2016, section III: "the first 600 samples were discarded"; "if any of the force or taxel
 responses violated a three sigma rule, the sample was discarded"; "each of the training, validation and testing set was
@@ -92,7 +88,6 @@ FIRST_FRAME = ProtocolSpec(
     scaled_by="training set",
     window_over="consecutive samples",
     first_row_only=True,
-    probe=True,
 )
 """Answers from a recording's first reading, before any contact. The hold, which includes this reading, is kept."""
 
@@ -104,7 +99,7 @@ PROTOCOLS = {
 
 def is_probe(name: str) -> bool:
     """Return True if the protocol of this name is a probe for leaks, False also for an unknown name."""
-    return name in PROTOCOLS and PROTOCOLS[name].probe
+    return name in PROTOCOLS and PROTOCOLS[name].first_row_only
 
 
 def without_options(name: str) -> str:

@@ -180,7 +180,7 @@ def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, st
     A window has `window` consecutive rows that the protocol keeps, tared if it tares, and the label of its last row.
     The next window ends `step` rows later. Raises NotApplicable if rows are not consecutive samples.
     """
-    own = task.answer_per == "frame" or task.summaries
+    own = task.answer_per != "sample"
     if own or rules.three_sigma or rules.first_row_only or rules.k is not None:
         raise NotApplicable(
             f"window={window} needs consecutive single samples, which "

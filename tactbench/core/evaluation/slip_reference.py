@@ -31,8 +31,6 @@ class SlipReference:
 
     t_ns: IntArray
     """(n,) times [ns] since the first row of the sensor's clock"""
-    displacement_m: FloatArray
-    """(n,) displacement [m] of the surface relative to the sensor's skin"""
     force_share: FloatArray
     """(n,) ratio of tangential force to friction coefficient times normal force; 0 without contact"""
     normal_n: FloatArray
@@ -106,4 +104,4 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     contact = normal >= target.thresholds.contact_force_n
     share = np.divide(np.abs(tangential), friction * normal, out=np.zeros_like(normal), where=contact)
     label, value = target.disturbance
-    return SlipReference(t_ns, slip, share, normal, labels, str(recording.meta.labels.get(label)) == value)
+    return SlipReference(t_ns, share, normal, labels, str(recording.meta.labels.get(label)) == value)

@@ -34,7 +34,7 @@ Features = Mapping[str, float]
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
     """Return True if each recording is reduced to one row of summaries, and not to its first row by the protocol."""
-    return task.answer_per == "recording" and bool(task.summaries) and not rules.first_row_only
+    return task.answer_per == "recording" and not rules.first_row_only
 
 
 def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
@@ -118,8 +118,9 @@ def tared_readings(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, .
 
 def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
     """Return the (channels,) values of a summary over its window; a band filter also uses earlier samples."""
-    rows = _window(stream, summary, recording)
-    values = in_band(stream, summary.band_hz, recording)[rows]
+    n = len(stream.data)
+    first = min(math.floor(summary.start * n), n - 1)
+    values = in_band(stream, summary.band_hz, recording)[first : max(math.ceil(summary.end * n), first + 1)]
     return np.asarray(measured(values, summary.measure, np.array([0]), np.array([len(values)]))[0])
 
 
@@ -151,28 +152,6 @@ def measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) 
 def _means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     return np.asarray((total[last] - total[first]) / np.maximum(last - first, 1)[:, None])
-
-
-def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
-    n = len(stream.data)
-    if summary.unit == "recording":
-        first = min(math.floor(summary.start * n), n - 1)
-        return slice(first, max(math.ceil(summary.end * n), first + 1))
-    if stream.time_s is None:
-        raise NotApplicable(
-            f"The summary {summary.name!r} has a window in seconds, but recording {recording!r} has no clock.",
-            hint="State the clock or the rate in the mapping, or give the window in shares of the recording.",
-        )
-    step_s = 0.0 if stream.rate_hz is None else 1.0 / stream.rate_hz
-    first, last = (int(place) for place in np.searchsorted(stream.time_s, [summary.start, summary.end]))
-    # The last sample stands for the interval after it.
-    if first == last or stream.time_s[-1] + step_s * (1 + 1e-6) < summary.end:
-        raise DataError(
-            f"Recording {recording!r} has {stream.time_s[-1]:.4g} s of {stream.stream} that the protocol keeps, but "
-            f"summary {summary.name!r} needs {summary.end:g} s.",
-            hint="Leave the recording out, or give the window in shares of the recording.",
-        )
-    return slice(first, last)
 
 
 def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recording: str) -> FloatArray:
@@ -244,10 +223,9 @@ def frame_features(
             filtered = {band: in_band(stream, band, table.meta.name) for band in bands}
             for summary in asked:
                 picked = columns_of(stream, summary)
-                scale = 1.0 if summary.unit == "s" else target.window_s
                 first, last = (
-                    np.searchsorted(_time(stream), ends_s - target.window_s + edge, side="right")
-                    for edge in (summary.start * scale, min(summary.end * scale, target.window_s))
+                    np.searchsorted(_time(stream), ends_s - target.window_s + edge * target.window_s, side="right")
+                    for edge in (summary.start, summary.end)
                 )
                 columns.append(measured(filtered[summary.band_hz][:, picked], summary.measure, first, last))
                 names += [f"{stream.channels[place]} {summary.name}" for place in picked]

@@ -199,29 +199,6 @@ def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> Fl
     return latency
 
 
-def displacement_at_detection(
-    onset_ns: IntArray, latency_s: FloatArray, t_ns: IntArray, displacement_m: FloatArray
-) -> FloatArray:
-    """Return the (e,) displacements of the surface from the onset of each event to its alarm [m].
-
-    Parameters
-    ----------
-    onset_ns, latency_s
-        (e,) onsets of events [ns], and latencies of their alarms [s].
-    t_ns, displacement_m
-        (n,) times [ns] and relative displacement [m] of the reference, interpolated linearly.
-
-    Notes
-    -----
-    An alarm before the onset gives zero or the opposite sign. The value is NaN for a miss, and if onset or alarm is
-    outside the times of the reference, since nothing is extrapolated.
-    """
-    start = t_ns[0]
-    clock, onset = (t_ns - start) / 1e9, (onset_ns - start) / 1e9
-    moved = [np.interp(at, clock, displacement_m, left=np.nan, right=np.nan) for at in (onset, onset + latency_s)]
-    return np.asarray(moved[1] - moved[0])
-
-
 def time_base(truth: GroundTruth, policy: AlarmPolicy, t_ns: IntArray) -> tuple[IntArray, int]:
     """Return (n,) 1 for times within the time base of false alarms, else 0, and the length of the time base [ns].
 

@@ -12,13 +12,13 @@ from tactbench.core.tables.text_table import TextTable, text_table
 _FIGURES = {
     "precision": "precision", "recall": "recall", "misses": "misses", "events": "events",
     "latency p50 [ms]": "onset latency p50 ms", "p95 [ms]": "onset latency p95 ms",
-    "false alarms/min": "false alarms per minute", "slipped [mm]": "displacement at detection p50 mm",
+    "false alarms/min": "false alarms per minute",
     "compute [s/s]": "compute s per s of signal",
 }  # fmt: skip
 """Key of the figure of merit of each column."""
 _NOTE = (
     "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
-    "Slipped: the median displacement from onset to alarm. Compute: computing time per second of signal."
+    "Compute: computing time per second of signal."
 )
 
 

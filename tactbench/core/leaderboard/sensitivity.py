@@ -6,6 +6,7 @@ Each set of ends has its own result folder, such as ``OUT/assumptions/placement_
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise, permutations, product
 from typing import Any
 
@@ -149,7 +150,7 @@ def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[Te
 def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
     sensors, row = list(found.stated), next(iter(found.stated.values()))
     scores = [score(one["score"], one["unit"]) for one in found.stated.values()]
-    lines = [["as stated", "", *(text for one in scores for text in (one, "")), _order_text(found.stated)]]
+    lines = [["as stated", "", "", "", *(text for one in scores for text in (one, "")), _order_text(found.stated)]]
     notes = dict.fromkeys([_NOTE])
     for name in sorted(
         found.rows, key=lambda one: (len(ends_of(one)), -max(abs(found.change(one, s)) for s in sensors))
@@ -158,20 +159,22 @@ def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
         values = (_alike({s: f"{one['simulation']['nuisances'][end]:g}" for s, one in own.items()}) for end in ends)
         texts = (text for sensor in sensors for text in _change(own.get(sensor), found.changes[name].get(sensor)))
         order = f"{_order_text({**found.stated, **own})}: {found.verdict(name)}"
-        lines.append([", ".join(ends), ", ".join(values), *texts, order])
-        for sensor, nuisance in product(own, ends):
-            one = ranges_of(specs[sensor]).get(nuisance) if sensor in specs else None
-            if one is not None:
+        ranges: dict[str, PhysicalRange] = {}
+        for sensor, nuisance in product(own, ends if len(ends) == 1 else ()):
+            if sensor in specs and (one := ranges_of(specs[sensor]).get(nuisance)):
+                ranges[sensor] = one
                 of = f", {sensor}" if nuisance not in RANGES else ""
-                notes[f"{nuisance}{of}: {one.lower:g} … {one.upper:g}, {one.source.reference} ({one.source.tag})."] = (
-                    None
-                )
+                notes[f"{nuisance}{of}: {one.source.reference} ({one.source.tag})."] = None
+        within = _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in ranges.items()})
+        source = _alike({sensor: one.source.tag for sensor, one in ranges.items()})
+        lines.append([", ".join(ends), ", ".join(values), within, source, *texts, order])
     campaigns = counted(row["n_replicates"] or 0, "campaign")
     about = [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
     numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
-    columns = ("nuisance", "value", *numeric, *["order"] * (len(sensors) > 1))
+    columns = ("nuisance", "value", "range", "source", *numeric, *["order"] * (len(sensors) > 1))
     lines = [line[: len(columns)] for line in lines]
-    return text_table(" · ".join(about), columns, lines, numeric=numeric, notes=tuple(notes))
+    table = text_table(" · ".join(about), columns, lines, numeric=numeric, notes=tuple(notes))
+    return replace(table, first_to_go=("source", "range"))
 
 
 def _alike(texts: Mapping[str, str]) -> str:

@@ -137,7 +137,7 @@ def _probes(task: TaskSpec, ways: Sequence[Way]) -> list[Way]:
         if rules.roles_only:
             split = None if task.splits[:1] == ("roles",) else "roles"
         honest = None if split == "shuffled" else split
-        if not rules.probe and split != "in-session":
+        if not rules.first_row_only and split != "in-session":
             found += [(DEPLOYABLE.name, honest), (FIRST_FRAME.name, honest), (DEPLOYABLE.name, "shuffled")]
     return found
 

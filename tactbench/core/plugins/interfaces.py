@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -173,6 +173,45 @@ class RigCheck:
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
     """Reasons for refusing the rig file, each with the next step; empty: the file is valid."""
+
+
+@dataclass(frozen=True)
+class CostPoint:
+    """Computing time and error of one setting of a computation."""
+
+    subject: str
+    """Name of the sensor whose readings are computed."""
+    observable: str
+    """Kind of channel to which the error refers."""
+    label: str
+    """Short name of the setting: ``default, 48 x 64, 16 nodes``."""
+    seconds: float
+    """Median time of the work named in the diagram's title."""
+    error: float
+    """Root mean square of the difference from the reference solution."""
+    worst: float
+    """Largest difference from the reference solution."""
+    unit: str
+    floor: float
+    """Standard deviation of the observable's own noise; infinity for an observable without noise."""
+
+
+class CostJob(NamedTuple):
+    """A measurement of computing time and error that is still to be made."""
+
+    label: str
+    run: Callable[[], list[CostPoint]]
+    """Function that makes the measurement; a TactbenchError raised in it becomes a row."""
+
+
+class CostStudy(NamedTuple):
+    """A diagram of computing time and error, and the measurements for it."""
+
+    title: str
+    reference: str
+    """Reference solution from which errors are computed, in one sentence."""
+    jobs: Sequence[CostJob]
+    """Measurements in order; the first measurement also computes the reference."""
 
 
 class ReplayRig(Protocol):

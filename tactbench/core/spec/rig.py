@@ -101,6 +101,9 @@ class RigDescriptor(_Named):
     """Names of a simulated rig's solvers in order of cost, the cheapest first."""
     verification: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called without arguments: Verdicts of the simulation against known exact results."""
+    work_precision: str | None = Field(default=None, pattern=WHERE)
+    """``module:callable``, called with a SensorDescriptor and ``rounds=``, a number of timed recordings: a CostStudy
+    of errors against seconds for each recording."""
     file: str | None = Field(default=None, pattern=WHERE)
     """``module:class``, a RigFile that also checks the rig's own settings, so that error messages name their line."""
     check: str | None = Field(default=None, pattern=WHERE)

@@ -125,10 +125,8 @@ class Summary(Frozen):
     sample; ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square after a causal
     band-pass (Butterworth, two poles at each end), in the channel's unit squared."""
     start: float = Field(default=0.0, ge=0)
-    end: float = Field(default=1.0, gt=0)
-    unit: Literal["recording", "s"] = "recording"
-    """Unit of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
-    protocol keeps; for frames, they are shares of the frame or seconds from its start."""
+    end: float = Field(default=1.0, gt=0, le=1)
+    """End of the window; like `start`, a share of the samples that the protocol keeps, or of the length of a frame."""
     band_hz: tuple[float, float] | None = None
     """Lower and upper end of the band of ``band-energy`` [Hz]; None for other measures."""
     kinds: tuple[ChannelKind, ...] = ()
@@ -138,8 +136,6 @@ class Summary(Frozen):
     def _one_window_one_band(self) -> Summary:
         if not self.start < self.end:
             raise ValueError("the end of a window must be greater than its start")
-        if self.unit == "recording" and self.end > 1:
-            raise ValueError("a window in shares of a recording must end at 1 or before; for seconds, set unit: s")
         if (self.measure == "band-energy") != (self.band_hz is not None):
             raise ValueError("band_hz is required by the measure band-energy, and invalid for other measures")
         if self.band_hz and not 0 < self.band_hz[0] < self.band_hz[1]:
@@ -150,10 +146,9 @@ class Summary(Frozen):
     def name(self) -> str:
         """Name of the summary in features and rows."""
         band = "" if self.band_hz is None else f" {self.band_hz[0]:g}-{self.band_hz[1]:g} Hz"
-        whole = self.unit == "recording" and (self.start, self.end) == (0.0, 1.0)
-        unit = "s" if self.unit == "s" else "of the recording"
+        window = "" if (self.start, self.end) == (0.0, 1.0) else f" {self.start:g}-{self.end:g} of the recording"
         kinds = f" of {', '.join(self.kinds)}" if self.kinds else ""
-        return f"{self.measure}{band}{'' if whole else f' {self.start:g}-{self.end:g} {unit}'}{kinds}"
+        return f"{self.measure}{band}{window}{kinds}"
 
 
 class TaskFields(Frozen):
@@ -169,8 +164,6 @@ class TaskFields(Frozen):
     """Further kinds of channels, used as features if a sensor has them."""
     summaries: tuple[Summary, ...] = ()
     """Summaries of each channel that are the features of a recording or of a frame."""
-    vote: Literal["frames"] | None = None
-    """Combination of frames' answers to a recording's answer: the commonest class (the first of equals) or the mean."""
 
 
 class TaskSpec(TaskFields):
@@ -182,8 +175,8 @@ class TaskSpec(TaskFields):
     """Kind of answer. For `events`, it is a time of onset: detectors score frames, and `alarms` makes alarms."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
-    """Unit of an answer. `recording`: one class or number for each recording, by `summaries` or by `vote`;
-    its label is constant within a recording. `frame`: one answer for each window of the target's length."""
+    """Unit of an answer. `recording`: one class or number for each recording, by `summaries`; its
+    label is constant within a recording. `frame`: one answer for each window of the target's length."""
     alarms: AlarmPolicy | None = None
     """Rules by which scores of frames become alarms, for events."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
@@ -237,8 +230,8 @@ class TaskSpec(TaskFields):
         framed = isinstance(self.target, SlipTarget)
         if framed != (self.answer_per == "frame"):
             raise ValueError("answer_per: frame and a target of frames require each other")
-        if framed and (not self.summaries or self.vote):
-            raise ValueError("answer_per: frame needs summaries and no vote")
+        if framed and not self.summaries:
+            raise ValueError("answer_per: frame needs summaries")
         if framed and "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time, and a frame would extend across a cut")
         if (self.kind == "events") != (self.alarms is not None and self.max_false_alarms_per_minute is not None):
@@ -252,13 +245,11 @@ class TaskSpec(TaskFields):
         if self.answer_per == "frame":
             return self
         if self.answer_per == "sample":
-            if self.summaries or self.vote:
-                raise ValueError("summaries and vote need answer_per: recording")
+            if self.summaries:
+                raise ValueError("summaries need answer_per: recording")
             return self
-        if bool(self.summaries) == bool(self.vote):
-            raise ValueError("answer_per: recording needs either summaries or vote: frames")
-        if not isinstance(self.target, LabelTarget):
-            raise ValueError("answer_per: recording needs a label")
+        if not self.summaries or not isinstance(self.target, LabelTarget):
+            raise ValueError("answer_per: recording needs summaries and a label")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording does not allow cuts")
         if unseen := {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at):
@@ -280,8 +271,6 @@ class TaskSpec(TaskFields):
             )
         if isinstance(self.target, SlipTarget):
             return str(self.target)
-        if self.vote:
-            return f"the {'commonest' if self.kind == 'classification' else 'mean'} answer of its frames"
         return ", ".join(one.name for one in self.summaries)
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:

@@ -10,7 +10,7 @@ import numpy as np
 from tactbench.core.conformance.streams import RATE_SHARE, good, joined, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
+from tactbench.core.recording.clock_fit import fit, wrong_rate
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.devices.driver import Driver
@@ -106,10 +106,9 @@ def _judge(check: DeviceCheck, stream: StreamData, order: SequenceCheck) -> None
         if stated_hz is not None and abs(hz / stated_hz - 1) > RATE_SHARE + 2 / len(np.unique(times)):
             check.problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
         if stream.device_ns is not None:
-            fit = ClockFit()
-            fit.add(stream.device_ns, times)
-            drift_ppm = 1e6 * fit.segments()[-1].drift
-            if refused := wrong_rate(name, 1e-6 * drift_ppm, round(1e9 * rows / hz)):
+            drift = fit(stream.device_ns, times)[-1].drift
+            drift_ppm = 1e6 * drift
+            if refused := wrong_rate(name, drift, round(1e9 * rows / hz)):
                 check.problems.append(f"{refused}. Correct device_ns in the device's driver.")
     marks = np.bitwise_or.reduce(marks_of(stream), axis=1)
     lacking = {"lost": order.gaps, "received twice or late": order.duplicates + order.late,

@@ -22,12 +22,14 @@ if TYPE_CHECKING:
               help="Also check the forces which this rig file permits, then open and read its devices.")  # fmt: skip
 @click.option("--seconds", type=FiniteRange(min=0, max=600), default=3.0, show_default=True, metavar="T",
               help="Time [s] to read each device; 0 opens no device.")  # fmt: skip
+@click.option("--jog", metavar="AXIS",
+              help="Move one axis of the rig by small steps; the force is monitored and shown.")  # fmt: skip
 @format_option("table", "json")
 @click.pass_context
-def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: str) -> None:
+def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str | None, shape: str) -> None:
     """List ports and buses of this machine, with permissions, and check the devices of a rig.
 
-    Nothing is opened without --rig-file, or if the rig refuses the file; no motor is started. Problems are
+    Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
     printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
     opened; 2 for a wrong rig file.
     """
@@ -51,7 +53,7 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: st
         would = load_object(where)(rig) if where else None
         for name, entry in rig.entries().items():
             descriptor_of(registry, name, entry)  # an unknown name is an error of the file, not a problem of a device
-        if seconds and not (would and would.problems):
+        if jog is None and seconds and not (would and would.problems):
             remark(f"Reading each device for {seconds:g} s; nothing may touch them.")
             checks = check_devices(rig, registry, seconds=seconds, clock=time.monotonic_ns)
     denied = [f"{one.name}: permission denied. {one.denied}" for one in host if one.denied]
@@ -64,8 +66,12 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: st
         click.echo(json_text(about, indent=1))
     else:
         _print(host, would, checks, of_rig + denied)
-        if rig is not None and not checks:
+        if rig is not None and not checks and jog is None:
             click.echo("No device was opened, and no axis has moved.")
+    if jog is not None and not of_rig:
+        from tactbench.devices.cli.jog import jog_axis
+
+        jog_axis(rig, would, registry, jog)
     ctx.exit(1 if of_rig or (denied and rig is None) else 0)
 
 

@@ -13,7 +13,7 @@ class HostItem:
     """One port or bus of this machine."""
 
     kind: str
-    """``serial port``, ``SPI`` or ``CAN``."""
+    """``serial port`` or ``CAN``."""
     name: str
     text: str = ""
     denied: str = ""
@@ -21,7 +21,7 @@ class HostItem:
 
 
 def look_at_host() -> Iterator[HostItem]:
-    """Yield the serial ports that pyserial lists, the SPI devices of Linux, and the CAN interfaces; opens no device.
+    """Yield the serial ports that pyserial lists, and the CAN interfaces; opens no device.
 
     The text of a serial port includes the path that stays the same in another USB socket.
     """
@@ -33,8 +33,6 @@ def look_at_host() -> Iterator[HostItem]:
         stable = (str(name) for name in names if name.resolve() == Path(port.device).resolve())
         texts = (text for text in (port.description, port.hwid, *stable) if text not in ("", "n/a"))
         yield HostItem("serial port", port.device, ", ".join(texts), _denied(Path(port.device)))
-    for path in sorted(Path("/dev").glob("spidev*")):
-        yield HostItem("SPI", str(path), denied=_denied(path))
     for name, stats in sorted(psutil.net_if_stats().items()):
         if "can" in name:
             rate = "" if name.startswith("vcan") else " type can bitrate 1000000"

@@ -418,7 +418,7 @@ def driver_waits_and_stops(subject: Subject) -> None:
         for _ in range(TRIES):
             opened.driver.read(0.0)
             spent.append((time.perf_counter(), time.thread_time()))
-        wall_s, busy_s = min((b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(spent))
+        wall_s, busy_s = min(map(tuple, np.diff(spent, axis=0)))
         if wall_s > SLEEP_S and busy_s < wall_s / 2:
             fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s; it must return at once")
         opened.call("stop")
@@ -514,27 +514,22 @@ def device_is_fit_for_a_rig(subject: Subject) -> None:
     as SATURATED. Do not move or power a motor in the driver's constructor, identify(), start() and read().
     """
     device, sensed = subject.descriptor.kind, dict[str, float]()
-    kind, unit = ("force", "N") if device == "force" else ("position", "m")
     if device not in ("force", "motor"):
         skip(f"a device of kind {device} is neither force sensor nor motor")
+    kind, unit = ("force", "N") if device == "force" else ("position", "m")
     with emulated(subject, senses=lambda t_s: sensed) as opened:
-        own = [one for one in opened.channels() if one.kind == kind]
-        for channel in own:
-            if channel.unit != unit:
-                fail(f"driver.streams: {channel.name}.unit", f"the unit is {channel.unit!r}, {unit!r} is needed")
-        if not own:
-            fail("driver.streams", f"no channel of the device is of kind {kind}")
-
-        sensed.update({one.name: OVERLOAD_N for one in own if kind == "force"})
+        sensed |= {one.name: OVERLOAD_N for one in opened.channels() if device == one.kind == "force"}
         opened.read()
-        for name, stream in opened.read().items():
-            for column, one in enumerate(stream.spec.channels):
-                if one not in own:
-                    continue
-                where, marks = f"driver.read: {name}.{one.name}", marks_of(stream)[:, column]
-                there = good(stream)[:, column]
-                there = there[np.isfinite(there)]  # none before an axis is homed
-                if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
-                    fail(where, f"the position changes by {1e3 * moved_m:.3g} mm without a move")
-                if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
-                    fail(where, f"rows are not marked SATURATED at {OVERLOAD_N:g} N")
+        own = [(f"driver.read: {name}.{one.name}", one, marks_of(stream)[:, column], good(stream)[:, column])
+               for name, stream in opened.read().items() for column, one in enumerate(stream.spec.channels)
+               if one.kind == kind]  # fmt: skip
+    if not own:
+        fail("driver.streams", f"no channel of the device is of kind {kind}")
+    for where, channel, marks, values in own:
+        if channel.unit != unit:
+            fail(f"driver.streams: {channel.name}.unit", f"the unit is {channel.unit!r}, {unit!r} is needed")
+        if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
+            fail(where, f"rows are not marked SATURATED at {OVERLOAD_N:g} N")
+        there = values[np.isfinite(values)]  # none before an axis is homed
+        if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
+            fail(where, f"the position changes by {1e3 * moved_m:.3g} mm without a move")

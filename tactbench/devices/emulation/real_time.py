@@ -22,8 +22,12 @@ from tactbench.links.datagram_link import LARGEST_DATAGRAM
 
 STOP_S = 0.05
 """Longest wait of a server without events [s], after which it checks for a request to end."""
-BAUD = 3_000_000
-"""Rate in the address of a serial line [bit/s]: above that of any device; pseudo-terminals have no rate."""
+_ADDRESSES = {
+    "bytes": "serial://{}?baud=3000000",  # above the rate of any device; pseudo-terminals have none
+    "spi": f"spi://bridge/{{}}?speed_hz={SPI_HZ}",
+    "can": "can://slcan/{}?bitrate=1000000&sleep_after_open=0",  # nothing here restarts when its port is opened
+}
+"""Addresses of emulated devices' links, with ``{}`` in place of the terminal's path."""
 
 
 class PseudoTerminal:
@@ -188,7 +192,7 @@ class RealTimeDevices:
         for name, device in devices.items():
             emulator = device.far_end()
             line = Line(SlcanAdapter(emulator) if device.link == "can" else emulator, device.faults)
-            end = UdpEnd() if device.link == "datagram" else PseudoTerminal(_pattern(device))
+            end = UdpEnd() if device.link == "datagram" else PseudoTerminal(_ADDRESSES[device.link])
             line.deliver = end.send
             self._selector.register(end.fileno(), selectors.EVENT_READ)
             self._open[name] = line, end
@@ -244,12 +248,3 @@ class RealTimeDevices:
         line.deliver = None
         self._selector.unregister(end.fileno())
         end.close()
-
-
-def _pattern(device: EmulatedDevice) -> str:
-    """Return the address of a device's link, with ``{}`` in place of the terminal's path."""
-    return {
-        "spi": f"spi://bridge/{{}}?speed_hz={SPI_HZ}",
-        # The bit rate has no effect, and nothing here restarts when its port is opened.
-        "can": "can://slcan/{}?bitrate=1000000&sleep_after_open=0",
-    }.get(device.link, f"serial://{{}}?baud={device.baud or BAUD}")

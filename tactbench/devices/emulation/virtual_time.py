@@ -36,8 +36,6 @@ class EmulatedDevice:
     """SpiDeviceEmulator for the link kind `spi`, DeviceEmulator for other kinds."""
     faults: tuple[LinkFault, ...] = ()
     """Faults of the link; faults of the device itself are in its emulator."""
-    baud: int | None = None
-    """Bit rate in the address of a serial line [bit/s]; None: above that of any device."""
 
     def far_end(self) -> DeviceEmulator:
         """Return the device's end of its link; an SPI device gets a bridge."""
@@ -100,7 +98,7 @@ class EmulatedDevices:
     """
 
     def __init__(self, devices: Mapping[str, EmulatedDevice]) -> None:
-        self._kinds = {name: one.link for name, one in devices.items()}
+        self._devices = dict(devices)
         self._lines = {name: Line(one.far_end(), one.faults) for name, one in devices.items()}
         self.clock = VirtualTime([*self._lines.values()])
 
@@ -118,7 +116,7 @@ class EmulatedDevices:
     def open_link(self, name: str) -> Link:
         """Open the host's end of a device's link; raises LinkError if it is open already."""
         kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}
-        kind = self._kinds[name]
+        kind = self._devices[name].link
         link = kinds.get(kind, VirtualByteLink)(name, self.clock, self._lines[name])
         return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 

@@ -30,9 +30,6 @@ FLOOR_N = 0.6e-3
 rms of Fz); without it a sensor without noise would seem stuck."""
 BEYOND_M = 1.0
 """Length of the linear spring beyond the press curve's end [m]: at least the travel of any motor."""
-_FLOOR_DRAWS = 1 << 14
-_FLOOR_HZ = 7000
-"""Rate of new noise values [Hz]: one for each sample of a Net F/T box."""
 
 
 def quiet(scene: Scene) -> Scene:
@@ -90,7 +87,7 @@ class EmulatedPress:
         streams = (*simulated.streams, *simulated.reference)
         self._samples = SceneSamples(streams, simulated, self._duration_s, rest_s=self._hold_s)
         self._samples.start(0.0)
-        self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
+        self._rng = rng
 
     def start(self, at_s: float) -> None:
         """Let the scene's time begin at `at_s` of the devices' clock [s]."""
@@ -111,8 +108,7 @@ class EmulatedPress:
             at_s = min(self._hold_s + force_n * self._s_per_n, last_s)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
-        floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
-        return {**self._samples(at_s), FORCE: force_n + noise_n + floor}
+        return {**self._samples(at_s), FORCE: force_n + noise_n + FLOOR_N * self._rng.standard_normal()}
 
 
 class PressEmulators(RigEmulators):

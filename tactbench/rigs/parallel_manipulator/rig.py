@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain
 from typing import TYPE_CHECKING
 from weakref import finalize
 
@@ -42,13 +41,12 @@ from tactbench.plugin.devices import (
     StreamCounts,
     ask_operator,
     physics_of,
-    read_options,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
 from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.session import Session
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, axis_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, ScenePhysics
@@ -87,13 +85,13 @@ class PressAcquisition:
         """Yield blocks of sensor, force sensor and motor until the scene is over; then unload it and retreat."""
         end_ns = self.begin_ns + round(1e9 * self.duration_s)
         for block in self.blocks:
-            yield from self._within(chain((block,), self.control.blocks()), end_ns)
+            yield from self._within((block, *self.control.blocks()), end_ns)
             if self.control.press.over or (self.clock() >= end_ns and self.reading.ended):
                 break
         yield from self._within(self.control.blocks(), end_ns)
         self.events += self.control.events()
 
-    def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
+    def _within(self, blocks: Iterable[Block], end_ns: int) -> Iterator[Block]:
         for block in blocks:
             assert block.t_ns is not None
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
@@ -106,11 +104,10 @@ class PressAcquisition:
 
         A further interrupt does not stop the retreat.
         """
-        waiting = True
-        while waiting:
+        while True:
             with suppress(KeyboardInterrupt):
                 self.control.retreat(why, self.retreat_s)
-                waiting = False
+                break
         self.events += self.control.events()
         return self.control.press.not_out
 
@@ -150,9 +147,8 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Reason for an early end of the scene; empty: no early end."""
-        press, late = self.control.press, self.control.late
-        reason = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
-        return "; ".join(filter(None, (reason, press.not_out))) or self.reading.ended
+        press = self.control.press
+        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):
@@ -182,8 +178,8 @@ class ParallelManipulator(Rig):
         self._file, self._operator, self._physics, self._registry = file, operator, physics, load_registry()
         self._session: Session | None = None
         limited, self.settings = with_limits(file, self._registry)
-        kind, options = positioner_of(self._registry, MOTOR, limited.devices[MOTOR])
-        self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
+        kind, options = axis_of(self._registry, MOTOR, limited.devices[MOTOR])
+        self._facts = kind.facts_of(options)
 
     def close(self) -> None:
         """End the session, if one is open: disarm the guard and close all devices."""

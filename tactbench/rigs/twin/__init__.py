@@ -20,6 +20,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
             where=f"{_HERE}.rig:build",
             simulated=True,
             rungs=("closed-form", "default", "fine", "reference"),
+            work_precision=f"{_HERE}.work_precision:study",
             verification=f"{_HERE}.verify:verdicts",
         )
     ]

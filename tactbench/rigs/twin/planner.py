@@ -72,7 +72,14 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
         taken = signed.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
-        entries[effect.name] = _entry(effect, reason, taken, asked=effect.name in signed)
+        asked, text, change = effect.name in signed, reason.text, reason.change
+        if asked and (taken or reason.called_for):
+            text = f"{'included' if taken else 'left out'} as stated; else: {text}"
+        if reason.called_for and not taken:
+            change = None  # what an effect would have changed that was called for is no bound any more
+        entries[effect.name] = PlanEntry(
+            effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked
+        )
     for kind in kinds:
         if not any(kind in effect.produces for effect in included):
             without = [name for name, taken in signed.items() if not taken]
@@ -124,15 +131,6 @@ def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reaso
             hint="Return tactbench.plugin.Reason(called_for, text).",
         )
     return reason
-
-
-def _entry(effect: EffectDescriptor, reason: Reason, taken: bool, *, asked: bool) -> PlanEntry:
-    text = f"included as stated; else: {reason.text}" if asked and taken else reason.text
-    if asked and not taken:
-        text = f"left out as stated; else: {reason.text}" if reason.called_for else reason.text
-    # An effect that was called for and is left out all the same: what it would have changed is no bound any more.
-    change = None if asked and not taken and reason.called_for else reason.change
-    return PlanEntry(effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked)
 
 
 def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:

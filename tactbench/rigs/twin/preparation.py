@@ -58,7 +58,9 @@ def prepare(
     """
     check_numbers(scene)
     sensor = handled(sensor, scene)
-    t_s, load = _load(scene)
+    profile = scene.profile
+    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
+    load = Load(*(np.array(corner) for corner in profile.corners))
     run = Synthesis(
         sensor=sensor,
         scene=scene,
@@ -98,13 +100,6 @@ def carried_out(
     for effect in plan.stages:
         run.apply(effect)
     return run
-
-
-def _load(scene: Scene) -> tuple[FloatArray, Load]:
-    """Return the reference clock's times [s] and the commanded normal force, piecewise linear in time."""
-    profile = scene.profile
-    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
-    return t_s, Load(*(np.array(corner) for corner in profile.corners))
 
 
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:

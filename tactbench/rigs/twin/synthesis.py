@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -186,6 +186,12 @@ class Synthesis:
         """The sensor's skin, which every simulated sensor has."""
         assert self.sensor.spec.skin is not None
         return self.sensor.spec.skin
+
+    def columns(self, kind: ChannelKind) -> Iterator[tuple[Track, int]]:
+        """Yield the recorded channels of a kind: their track, and their column in its readings."""
+        for track in self.tracks:
+            for column in track.by_kind().get(kind, []):
+                yield track, column
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
         """Return the nuisances of a kind of channel; None when the spec states none."""

@@ -2,7 +2,7 @@
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
 every byte. An SPI bridge (``spi://bridge/…``, a microcontroller that carries out batches by itself, ``docs/links.md``)
-keeps the time of 4400 words a second; the machine's own SPI (``spi://spidev/…``) does so less well.
+keeps the time of 4400 words a second.
 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
 4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`). Some batches are
@@ -29,7 +29,7 @@ the host too late for the next batch   its rows come later [batches late]; whole
 cable, port or bridge gone             the reading ends with LinkUnplugged
 =====================================  =================================================================================
 
-**Tested** against an emulator written from the same public sources, never with a real BioTac, bridge or spidev. Assumed
+**Tested** against an emulator written from the same public sources, never with a real BioTac or bridge. Assumed
 is above all that the sensor samples at the last bit of its command, that a property is read with the pause of a
 sampling command, and that a resend needs the same pause.
 """

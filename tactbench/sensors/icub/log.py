@@ -17,7 +17,6 @@ from tactbench.sensors.icub.codec import (
     OLD_SKIN,
     SKIN,
     TAIL,
-    BoardSetup,
     SkinDecoder,
     TriangleSetup,
     read_command,
@@ -72,18 +71,11 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         "samples kept out, not after the one before": len(samples) - len(kept),
         "baselines taken": sum(isinstance(command, TriangleSetup) for command in sent),
     }
-    setups = dict.fromkeys(command for command in sent if isinstance(command, BoardSetup))
     return DeviceLog(
         streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
         blocks=(to_block(kept),),
         clock="host",
-        remarks=(
-            f"Board {board}, triangle {triangle}, {rate.reference}.",
-            *(
-                f"The log sets the board up for type {setup.skin_type}, {setup.period_ms} ms, {setup.no_load} at rest."
-                for setup in setups
-            ),
-        ),
+        remarks=(f"Board {board}, triangle {triangle}, {rate.reference}.",),
         counts={name: number for name, number in counts.items() if number},
     )
 

@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from tactbench.core.cost import knobs
 from tests.conftest import Verbs
 from tests.core.cost.test_knobs import presses
@@ -34,3 +36,8 @@ def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(tm
     assert rows["10"]["simulation"]["tolerance"] == 10.0
     assert (rows["closed-form"]["sim_s"], rows["closed-form"]["score"]) == (None, None)
     assert "0.45" in rows["closed-form"]["reason"], "Poisson's ratio"
+
+
+@pytest.mark.parametrize("more", [("--repeats", "2"), ("--estimator", "ols")])
+def test_the_diagram_of_the_simulation_takes_no_option_of_answers(tmp_path, more):
+    Verbs(tmp_path, here=True)("cost", "--twin", "--sensor", "icub", *more, code=2)

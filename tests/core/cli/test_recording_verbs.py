@@ -100,13 +100,13 @@ def test_record_then_inspect(verbs):
 def test_what_a_crash_left_behind(tables):
     tables("import", "mapping.yaml", "--out", "recordings")
     one = tables.folder / "recordings" / "one.h5"
-    assert "--salvage" in tables("inspect", str(one), "--salvage", code=2).stderr
     with RecordingWriter(tables.folder / "new.h5", read_meta(one)) as writer:
         writer.append(Block("taxels", np.arange(9), np.ones((9, 2))))
         writer.append(Block("scale", np.arange(9), np.ones((9, 1))))
         shutil.copy(tables.folder / "new.h5.partial", tables.folder / "left.h5.partial")
+    assert "--rescue" in tables("inspect", "left.h5.partial", code=2).stderr
     assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--salvage").stdout)
-    tables("inspect", "left.h5.partial", "--rescue", "left.h5")
+    assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--rescue", "left.h5").stdout)
     assert read_meta(tables.folder / "left.h5").excluded
 
 

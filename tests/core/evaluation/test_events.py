@@ -21,7 +21,7 @@ from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
 from tests.core.events.made import policy
 
-RATE, LATENCY, MOVED = "false alarms per minute", "onset latency p50 ms", "displacement at detection p50 mm"
+RATE, LATENCY = "false alarms per minute", "onset latency p50 ms"
 COMPUTE = "compute s per s of signal"
 REGISTRY = load_registry()
 RULES = protocol_called("deployable")
@@ -44,7 +44,7 @@ def paths(tmp_path_factory):
 @pytest.mark.parametrize(
     "summary",
     [Summary(measure="deviation"), Summary(measure="mean-step", start=0.5),
-     Summary(measure="mean", start=0.02, end=0.06, unit="s")],
+     Summary(measure="mean", start=0.2, end=0.6)],
     ids=lambda summary: summary.name,
 )  # fmt: skip
 def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
@@ -56,7 +56,7 @@ def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
     frames = frame_times(table, TASK, untared)
     estimator = REGISTRY.estimators["frame-difference"].model_copy(update={"summaries": (summary,)})
     _, X = frame_features(TASK, untared, estimator)(table, frames)
-    begin, end = np.array([summary.start, summary.end]) * (0.1 if summary.unit == "recording" else 1.0) - 0.1
+    begin, end = 0.1 * np.array([summary.start, summary.end]) - 0.1
     for found, at_s in zip(X[::17], frames[::17] * 1e-9, strict=True):
         inside = (time_s > at_s + begin) & (time_s <= at_s + end)
         alone = replace(stream, data=stream.data[inside], time_s=time_s[inside])
@@ -87,7 +87,6 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     # The window of 0.1 s fills with louder samples after the onset, of which 10 ms (0.1 mm) pass before the label.
     # The policy asks for 20 ms of alarm more, and a frame ends every 10 ms.
     assert -10 <= events[LATENCY] <= 120
-    assert events[MOVED] == pytest.approx(events[LATENCY] * 0.01, abs=0.1)
     assert (result.n_test, result.confusion, result.classes) == (9, None, [])  # three slips, six recordings
     assert any("1000 Hz" in one for one in result.remarks)
 
@@ -164,11 +163,11 @@ def test_a_coefficient_of_friction_is_a_number_above_zero(tmp_path, friction):
 def test_a_reference_is_looked_up_until_its_last_interval_is_over_and_events_from_the_first_frame_on():
     t_ns, some = np.arange(4) * 10, np.zeros(4)
     labels = SlipLabels(np.array([0, 1, 2, 2]), np.array([[0, 9], [20, 30], [30, 33], [31, 35]]))
-    reference = SlipReference(t_ns, some, some, some, labels, False)
+    reference = SlipReference(t_ns, some, some, labels, False)
     assert reference.state(np.array([-1, 0, 9, 10, 40, 41])).tolist() == [-1, 0, 0, 1, 2, -1]
     ends_ns = np.array([20, 25, 30])
     truth = reference.truth(ends_ns)
-    scored = Scored(ends_ns, np.array([0.0, 0.5, 0.0]), truth, 0, reference)
+    scored = Scored(ends_ns, np.array([0.0, 0.5, 0.0]), truth, 0)
     assert EventRules(policy(), 1.0, 0.5, 5).curve([scored]).threshold.tolist() == [1.0, np.inf], "0.5 is reached"
     assert (truth.event_ns.tolist(), truth.span_ns) == ([[20, 30], [30, 33]], (20, 31))
 

@@ -1,15 +1,13 @@
-"""One answer a recording: by summaries on each stream's own clock, or by a vote."""
+"""One answer a recording: by summaries on each stream's own clock."""
 
 import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.evaluation.summaries import summarised
-from tactbench.core.samples import Part
 from tactbench.plugin import Block, ChannelSpec, StreamSpec, Summary
 from tests.core.evaluation.made import evaluated, held, label_task, record, sensor_of, write
 
@@ -45,7 +43,6 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
     assert result.ci_method.startswith("jackknife over 24 recordings ")
-    assert any("deviation, mean-step" in one for one in result.remarks)
 
 
 def test_splits_keep_recordings_whole(tmp_path):
@@ -133,16 +130,3 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     result = run(FAST, paths)
     assert (result.tare_s, result.score) == (pytest.approx(0.5), 1.0)
     assert result.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
-
-
-def part_of(recording, y):
-    row = np.arange(len(y))
-    return Part(np.zeros((len(y), 1)), np.asarray(y), row * 1.0, np.asarray(recording), row)
-
-
-def test_frames_vote_and_of_equals_the_first_class_wins():
-    asked, answer = voted(part_of([0, 0, 0, 2, 2], [1, 1, 1, 0, 0]), np.array([1, 1, 0, 1, 0]), 2)
-    assert answer.tolist() == asked.y.tolist() == [1, 0]
-    assert (asked.recording.tolist(), asked.row.tolist()) == ([0, 2], [2, 4])
-    _, mean = voted(part_of([0, 0, 1], [1.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0]), 0)
-    assert mean.tolist() == [2.0, 5.0]

@@ -79,9 +79,8 @@ def slips(folder, spec, estimator, loud=1.3, tapped=1.3, **more):
     return TIMED(task, made_slip.campaign(folder, number=2, tapped=tapped, loud=loud), estimator, **more)
 
 
-VOTED = test_per_recording.task(summaries=(), vote="frames")
 WINDOWED = test_per_recording.task(
-    summaries=(Summary(measure="range", start=0.05, end=0.2, unit="s"), Summary(measure="change", start=0.5)),
+    summaries=(Summary(measure="range", start=0.125, end=0.5), Summary(measure="change", start=0.5)),
 )  # fmt: skip
 CELLS = {
     "force": lambda folder: TIMED(force_task(), presses(folder, "abcdef"), "ridge"),
@@ -100,7 +99,6 @@ CELLS = {
     "whole, shuffled": lambda folder: TIMED(
         test_per_recording.task(), test_per_recording.sequences(folder, 12), "logistic", split="shuffled"
     ),
-    "vote": lambda folder: TIMED(VOTED, test_per_recording.sequences(folder, 12), "knn"),
     "vector": lambda folder: TIMED(
         test_vectors.place_task(), test_vectors.presses(folder, 15), "ridge", "deployable-untared", "session"
     ),

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.events.alarms import alarms, displacement_at_detection, match, score_events, time_base
+from tactbench.core.events.alarms import alarms, match, score_events, time_base
 from tactbench.core.spec.events import nanoseconds
 from tests.core.events.made import MS, clocks, policies, policy, seconds, truth, truths
 
@@ -118,14 +118,3 @@ def test_the_time_base_holds_what_its_definition_says_millisecond_by_millisecond
     assert np.array_equal(held, expected)
     # Its length is the number of held milliseconds but for the ends of events, which hold one nanosecond more.
     assert abs(length_ns - sum(expected) * MS) <= MS * len(truth_of.event_ns)
-
-
-def test_displacement_at_detection_is_what_the_surface_moved_since_the_onset():
-    clock = seconds(0.0, 1.0, 2.0, 3.0)
-    displacement = np.array([0.0, 0.0, 0.010, 0.030])
-    onset = seconds(1.0, 1.0, 1.0, 2.5, 1.0)
-    late = np.array([0.5, -0.5, 1.5, 1.0, np.nan])
-    moved = displacement_at_detection(onset, late, clock, displacement)
-    assert moved == pytest.approx([0.005, 0.0, 0.020, np.nan, np.nan], nan_ok=True)
-    later = displacement_at_detection(onset + 7 * 10**9, late, clock + 7 * 10**9, displacement)
-    np.testing.assert_array_equal(later, moved)

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
-from tactbench.core.recording.partial import salvage
+from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -28,7 +28,7 @@ def good(write):
     return write(DATA, force=np.arange(3000.0), notes={"object": np.repeat("ball", 3000)})
 
 
-@pytest.mark.parametrize("read", [open_recording, salvage])
+@pytest.mark.parametrize("read", [open_recording, lambda path: rescue(path, path.with_name("y.h5"))])
 def test_a_file_that_is_not_there_or_no_recording(tmp_path, read):
     for path in (tmp_path / "nowhere.h5", tmp_path):
         with pytest.raises(MissingRecordingError, match=path.name):
@@ -94,7 +94,9 @@ def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share
     (tmp_path / "copy.partial").write_bytes(whole[:place] + rest)
     n = np.arange(10 * sum(end <= place for end in ends))
     try:
-        with salvage(tmp_path / "copy.partial") as recording:
+        (tmp_path / "copy.h5").unlink(missing_ok=True)
+        rescue(tmp_path / "copy.partial", tmp_path / "copy.h5")
+        with open_recording(tmp_path / "copy.h5") as recording:
             meta, taxels = recording.meta, recording.read("taxels")
     except RecordingError:
         assert not len(n)

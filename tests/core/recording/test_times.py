@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.recording.clock_fit import HostTimes
+from tactbench.core.recording.clock_fit import host_times
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -37,5 +37,5 @@ def test_stored_times_are_exactly_recomputed_or_as_they_came_where_the_device_is
         assert np.array_equal(read.t_ns, host)
     else:
         assert np.array_equal(read.host_ns, host)
-        assert np.array_equal(read.t_ns, HostTimes(found["taxels"])(read.device_ns))
+        assert np.array_equal(read.t_ns, host_times(found["taxels"].segments, read.device_ns))
         assert found["taxels"].breaks == (0 < lost < 4000)

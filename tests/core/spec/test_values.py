@@ -40,7 +40,7 @@ REGISTRY = load_registry()
 FORCE = REGISTRY.tasks["force"].spec
 WHY = Source(tag="assumed", reference="a test")
 FRAMES = SlipTarget(hop_s=0.01, window_s=0.1)
-MEAN, VOTE = (Summary(measure="mean"),), {"vote": "frames", "answer_per": "recording", "splits": ()}
+MEAN = (Summary(measure="mean"),)
 LABEL = {"kind": "classification", "metric": "macro_f1", "target": LabelTarget(name="a"), "unit": "1"}
 
 
@@ -64,13 +64,9 @@ def from_frames(**more):
         (Parameter(default=1, unit="mm", text="t", least=0.5).range, "0.5 mm or more"),
         (Parameter(default=1, unit="1", text="t", most=3).range, "0 to 3"),
         (MEAN[0].name, "mean"),
-        (Summary(measure="mean", end=2, unit="s").name, "mean 0-2 s"),
         (Summary(measure="mean", end=0.5, kinds=("taxel",)).name, "mean 0-0.5 of the recording of taxel"),
         (Summary(measure="band-energy", band_hz=(5, 20)).name, "band-energy 5-20 Hz"),
         (force_task().answer_from, ""),
-        (force_task(**LABEL, **VOTE).answer_from, "the commonest answer of its frames"),
-        (force_task(**LABEL | {"kind": "regression", "metric": "rmse"}, **VOTE).answer_from,
-         "the mean answer of its frames"),
         (force_task(**LABEL, answer_per="recording", splits=(), summaries=MEAN).answer_from, "mean"),
         (from_frames(splits=()).answer_from, str(FRAMES)),
         (plural("session"), "sessions"),
@@ -104,12 +100,11 @@ def test_quantities_have_the_tag_of_their_maker_and_times_are_whole_nanoseconds(
 
 
 def test_named_profiles_without_parameters():
-    stairs, press, sine = force_profiles.staircase(), force_profiles.press_hold_release(), force_profiles.sine()
+    stairs, sine = force_profiles.staircase(), force_profiles.sine()
     levels = [1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0]
     assert stairs.forces_n == (0, 0, *np.repeat(levels, 2))
     assert stairs.times_s == (0, 3, *np.cumsum([0.5, 3.0] * 10) + 3)
-    assert press.corners == ((0, 3, 4, 14, 15, 25), (0, 0, 5, 5, 0, 0))
-    assert (stairs.samples, press.samples, sine.samples) == (3800, 2500, 2800)
+    assert (stairs.samples, sine.samples) == (3800, 2800)
     t = np.array(sine.times_s[2:])
     assert (len(t), t[0], t[-1]) == (641, 4.0, pytest.approx(14.0))
     np.testing.assert_allclose(sine.forces_n[2:], 2 - np.cos(2 * np.pi * (t - 4)), atol=1e-9)

@@ -57,8 +57,8 @@ def test_figures_of_replicates_are_their_medians_counts_their_sums_and_means_are
     def of(n):
         return {
             "events": {"alarms": n, "misses": 10 * n}, "confusion": [[n, 0], [1, n]],
-            "counts": {"rows left out": n}, "chosen": {"k": n}, "scores": {"r2": n / 10}, "delay_parts_ms": {"window": n, "link": 1.0},
-            "answer_delay_ms": n + 1.0,
+            "counts": {"rows left out": n}, "chosen": {"k": n}, "scores": {"r2": n / 10},
+            "delay_parts_ms": {"window": n, "link": 1.0}, "answer_delay_ms": n + 1.0,
         }  # fmt: skip
 
     rows = [one | of(n) for n, one in zip((1, 2, 6), replicates(SCORES[:3]), strict=True)]

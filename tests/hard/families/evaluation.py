@@ -89,7 +89,7 @@ def any_data(case, *, protocol, name, kind):
     for one in hardships:
         one(case, recordings)
     # A probe refuses what changes within a recording, as a force does.
-    answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].probe
+    answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].first_row_only
     case.right = "answer" if answerable else "either"
     asked = {"regression": force_task, "classification": label_task}[kind](
         protocols=tuple(PROTOCOLS), splits=("roles", "session", "in-session", "shuffled"), baselines=("mean",)

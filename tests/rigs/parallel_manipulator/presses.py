@@ -54,19 +54,10 @@ class Rig:
                 )
             )
 
-    def begin_anew(self):
-        """Disarm, and forget what was: for the next test with the same guard."""
-        self.guard.disarm()
-        for items in (self.guard.force_blocks, self.guard.motor_blocks, self.guard.events):
-            items.clear()
-        self.world.force.faults.clear()
-        self.world.sensed = lambda wrench, at_s: wrench
-        self.world.largest_n = 0.0
-
-    def press(self, change=lambda beat, since_s: beat, hold_s=0.1):
+    def press(self, change=lambda beat, since_s: beat, hold_s=0.1, most_s=15.0):
         """Press until it is over or the guard is no longer armed; return the press."""
         press = FAULTS.Press(self.guard, self.setting, self.clock, change, hold_s=hold_s)
-        press.run(15.0)
+        press.run(most_s)
         return press
 
     def ended(self, seconds=3.0):

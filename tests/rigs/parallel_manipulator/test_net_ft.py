@@ -11,7 +11,6 @@ from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeo
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     AXES,
     Command,
-    DatagramError,
     NetFtOptions,
     decode_records,
     decode_request,
@@ -73,20 +72,18 @@ def test_records(sent, rdt, ft, status, values):
 
 
 def test_what_is_no_datagram_of_this_protocol_is_rejected():
-    for n in (0, 8, 35, 37):
-        with pytest.raises(DatagramError):
+    for n in (8, 35, 37):
+        with pytest.raises(ValueError, match="size"):
             decode_records(bytes(n))
     for other in ("", "12 34 00 00 00 00 00", "12 35 00 02 00 00 00 00", "12 34 00 01 00 00 00 00"):
-        with pytest.raises(DatagramError):
-            decode_request(bytes.fromhex(other))
+        assert decode_request(bytes.fromhex(other)) is None
 
 
 def test_marks_of_a_status():
-    assert quality(0) == Quality.GOOD
-    assert quality(0x80010000) == Quality.GOOD
-    assert quality(0x80020000) == quality(0x80030000) == Quality.SATURATED
-    assert quality(0x80000004) == quality(0x80000000) == quality(1) == Quality.SUSPECT
-    assert quality(0xFFFFFFFF) == Quality.SATURATED | Quality.SUSPECT
+    good, saturated, suspect = Quality.GOOD, Quality.SATURATED, Quality.SUSPECT
+    marks = {0: good, 0x80010000: good, 0x80020000: saturated, 0x80030000: saturated, 0x80000004: suspect,
+             0x80000000: suspect, 0x10000: suspect, 1: suspect, 0xFFFFFFFF: saturated | suspect}  # fmt: skip
+    assert quality(np.array([*marks], ">u4")).tolist() == [*marks.values()]
 
 
 # The emulator --------------------------------------------------------------------------------------------------------
@@ -176,7 +173,7 @@ def test_a_saturated_sensor_is_marked_and_counted():
     saturated = (block.device_ns / 1e9 - 1 / 7000 >= 0.5 - 1e-9) & (block.device_ns / 1e9 - 1 / 7000 < 1.0 - 1e-9)
     assert (block.quality[saturated] == Quality.SATURATED).all()
     assert (block.quality[~saturated] == Quality.GOOD).all()
-    assert driver.counts == {"errors": saturated.sum(), "saturated": saturated.sum()}
+    assert driver.counts == {"errors": saturated.sum()}
 
 
 def test_a_box_that_is_silent_or_gone():

@@ -152,7 +152,7 @@ def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
 
 
 def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent():
-    said = with_joints(**{"devices__joint-2__faults": ["late-answers:delay_s=9"]}, **RARER)
+    said = with_joints(**{"devices__joint-2__faults": ["late:delay_s=9"]}, **RARER)
     rig = ParallelManipulator(RigFile.model_validate(said), None, ScenePhysics(SpringRig(5.0)))
     with pytest.raises(LinkError, match="joint-2"):
         pressed(rig, ramp(1.0, 0.3, 1.0))

@@ -95,7 +95,7 @@ def _embedded(results: Results, panel: Panel) -> tuple[IntArray, FloatArray]:
     Raises
     ------
     NotApplicable
-        If the test set consists of folds with different scaling, or recordings are classified by a vote.
+        If the test set consists of folds with different scaling.
     DataError
         If the recordings differ from those that the cell was evaluated on.
 
@@ -128,8 +128,6 @@ def _features(results: Results, row: dict[str, Any], test: Answers) -> FloatArra
     estimator = results.registry.estimators[row["estimator"]]
     paths = results.recordings(row)
     data = load_task(task, paths, row["protocol"], row["split"], estimator=estimator, seed=row["seed"])
-    if data.data.vote:
-        raise NotApplicable("a recording is classified by a vote of its frames, and has no features of its own")
     k = int(row["chosen"].get("k", with_windows(estimator, task, data.rules).window_grid[0]))
     test_part = prepared(data.assignments[0], data.data, data.rules, k, Counter()).test
     if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):

@@ -1,20 +1,24 @@
-"""Figure and table of accuracy against time: settings varied by `tactbench cost`."""
+"""Figures and tables of accuracy against time: settings varied by `tactbench cost`, errors of a simulated rig."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cost.knobs import TIMES
+from tactbench.core.cost.precision import SHARE, diagrams
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
+from tactbench.core.plugins.interfaces import CostPoint
 from tactbench.core.report.figures.style import MARKERS, legend, panels, save, styled
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ACROSS = {
@@ -36,19 +40,14 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
         own = [one for one in shown if TIMES[one["knob"]] == time]
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
             place = list(TIMES).index(knob)
-            style = MARKERS[place] + ("" if knob == "estimator" else "-")
-            across, upwards = [one[time] for one in path], [one["score"] for one in path]
-            here.plot(across, upwards, style, color=f"C{place}", label=knob)
+            points = [(one[time], one["score"], str(one["value"])) for one in path]
+            _draw_points(here, points, place, line="" if knob == "estimator" else "-", label=knob)
             for one in path:
-                here.annotate(f" {visible(str(one['value']))}", (one[time], one["score"]), color=f"C{place}")
                 if one["ci_low"] is not None and one["ci_high"] is not None:
                     here.vlines(one[time], one["ci_low"], one["ci_high"], color=f"C{place}")
         if known["trivial"] is not None:
             here.axhline(known["trivial"], color="grey", ls="--", label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
-        # 1, 2, 5, 10 … instead of powers of ten.
-        here.xaxis.set_major_formatter("{x:g}")
-        here.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
     axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
@@ -61,6 +60,34 @@ def title_of(known: Mapping[str, Any]) -> str:
     several = f"{known['replicates']} replicates" if known["replicates"] > 1 else "one replicate"
     bars = ", bars: 95 %" if any(one["ci_low"] is not None for one in known["settings"]) else ""
     return f"{known['sensor']}, {known['task']} · {known['protocol']}{simulated} · {several}{bars}"
+
+
+def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
+    """Return the figure of a simulated rig: error against seconds per recording, one panel for each observable.
+
+    The dashed line is a third of the observable's noise.
+    """
+    found = diagrams(points)
+    figure, axes = panels(1, len(found), wide=True)
+    for here, ((subject, observable), group) in zip(axes[0], found.items(), strict=True):
+        _draw_points(here, [(one.seconds, one.error, one.label) for one in group], 0, line="")
+        if math.isfinite(group[0].floor):
+            here.axhline(SHARE * group[0].floor, color="black", ls="--", label="a third of the noise")
+        here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
+                 ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
+    figure.suptitle(title)
+    legend(figure, axes.flat)
+    return figure
+
+
+def _draw_points(
+    here: Axes, points: Sequence[tuple[float, float, str]], place: int, *, line: str, label: str = ""
+) -> None:
+    """Draw points with a text beside each, joined by a line of the style `line`; `place` selects colour and marker."""
+    across, upwards, texts = zip(*points, strict=True)
+    here.plot(across, upwards, MARKERS[place] + line, color=f"C{place}", label=label)
+    for x, y, text in zip(across, upwards, texts, strict=True):
+        here.annotate(f" {visible(text)}", (x, y), color=f"C{place}")
 
 
 _COLUMNS = {

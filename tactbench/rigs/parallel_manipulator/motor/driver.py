@@ -40,11 +40,10 @@ STANDING_NS = 20_000_000
 
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
-_WATCHED = ("POS", "GRC", "OST")
 _CHANGED = "Check if the drive was without power or set by another program, and the option against its manual."
 
-_Setting = tuple[str, int, str]
-"""Command, argument, and the query that reads the setting back."""
+_ENDS = ("GPL", "GNL")
+"""Queries of the ends of travel, which are set by homing."""
 
 
 def retreat_command(options: FaulhaberOptions) -> bytes:
@@ -61,8 +60,8 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 class FaulhaberDriver(Positioner):
     """Driver of a linear motor on a Faulhaber drive of the 300x RS generation.
 
-    While the motor moves, position and current are polled as fast as the line permits, 30 to 40 times a second at 9600
-    baud, 200 times at 115200; at rest 50 times. The time of a state is the receipt of the first byte of the
+    While the motor moves, position and status are polled as fast as the line permits, some 40 times a second at 9600
+    baud, 250 times at 115200; at rest 50 times. The time of a state is the receipt of the first byte of the
     position's answer; the drive has measured it a few bytes earlier. Every setting, limit and target is read back:
     the protocol has no checksum.
     """
@@ -73,11 +72,12 @@ class FaulhaberDriver(Positioner):
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
-        self._settings, self._limits = _required(self.options)
+        self._settings = _stated(self.options)
         self._exchange = Exchange(self.link, settings.clock, self.options.baud)
         self._watching = self._confirming = self._acknowledged = False
-        self._turn = self._polled_ns = self._move_number = 0
-        self._latest: dict[str, Answer] = {}
+        self._polled_ns = self._move_number = 0
+        self._position: Answer | None = None
+        """Position whose status is queried next."""
         self._usual = 0
         """Usual speed of moves in the drive's units."""
         self._speed: int | None = None
@@ -92,7 +92,7 @@ class FaulhaberDriver(Positioner):
         RigError
             For a setting that the drive does not support.
         """
-        _required(options)
+        _stated(options)
         bytes_ahead = LONGEST_AHEAD + len(retreat_command(options))
         return replace(
             super().facts_of(options),
@@ -126,12 +126,12 @@ class FaulhaberDriver(Positioner):
         if not self._has(Configuration.ACKNOWLEDGES):
             raise PositionerError("The motor's drive does not acknowledge commands after ANSW2.")
         self._ask("SOR", 0)
-        self._settings, _ = _required(self.options)
-        if (limit_a := self.options.current_limit_a) is not None:
+        if "GPC" in self._settings:
             # The continuous current may not be above the peak; a lower one is the motor's own.
-            self._settings.append(("LCC", min(self.options.current(limit_a), self._sure("GCC")), "GCC"))
-        for setting in self._settings:
-            self._keep(*setting)
+            self._settings["GCC"] = ("LCC", min(self._settings["GPC"][1], self._sure("GCC")))
+        for query, setting in self._settings.items():
+            if query not in _ENDS:
+                self._keep(query, *setting)
         self._usual = self._speed = self._sure("GSP")
         self.enabled = self._has(Configuration.POWER_STAGE)
         if self.enabled:
@@ -177,9 +177,9 @@ class FaulhaberDriver(Positioner):
         A drive that was without supply has kept neither (assumed: its power stage is off until EN).
         """
         self.homed = (
-            bool(self._limits)
+            _ENDS[0] in self._settings
             and self._has(Configuration.POWER_STAGE | Configuration.POSITION_LIMITS)
-            and all(self._sure(query) == argument for _, argument, query in self._limits)
+            and all(self._sure(query) == self._settings[query][1] for query in _ENDS)
         )
         if self.homed:
             self.locate()
@@ -191,9 +191,9 @@ class FaulhaberDriver(Positioner):
         The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive gets
         its usual current limits again once the origin is found.
         """
-        if self.moving or not self._limits:
+        if self.moving or _ENDS[0] not in self._settings:
             raise NotReadyError(
-                f"The motor {'is moving' if self.moving else 'has no ends of travel'}.",
+                "The motor is moving, or has no ends of travel.",
                 hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
             )
         options, self.homed = self.options, False
@@ -206,22 +206,22 @@ class FaulhaberDriver(Positioner):
         place_m, _ = self.locate()
         if abs(place_m - options.home_m) > CORRIDOR_M:
             raise PositionerError(f"The motor reports {place_m:g} m after homing to {options.home_m:g} m.")
-        for setting in self._limits:
-            self._keep(*setting)
+        for query in _ENDS:
+            self._keep(query, *self._settings[query])
         self._ask("APL", 1)
         self._check_limits()
         self.homed = True
         if self.enabled:
             # Position control again, from a target that is known, within the ends of travel.
-            (_, upper, _), (_, lower, _) = self._limits
+            upper, lower = (self._settings[query][1] for query in _ENDS)
             self._go(min(max(home, lower), upper), self._usual)
             self.finish(stop)
 
     def confirm(self) -> None:
         """Read back all settings and ends of travel of the options; raises PositionerError if a value differs."""
-        for setting in (*self._settings, *self._limits):
+        for query, setting in self._settings.items():
             # The speed of the last retreat may still be set.
-            (self._keep if setting[0] == "SP" else self._same)(*setting)
+            (self._keep if query == "GSP" else self._same)(query, *setting)
         self._speed = None
         self._check_limits()
 
@@ -232,9 +232,9 @@ class FaulhaberDriver(Positioner):
     def _against_stop(self, stop: Callable[[], bool]) -> None:
         """Run at the homing speed and current until the motor stands at its current limit in two successive polls."""
         little = self.options.current(self.options.homing_current_a)
-        before = [("LPC", self._sure("GPC"), "GPC"), ("LCC", self._sure("GCC"), "GCC")]
-        for command, argument, query in before:
-            self._keep(command, min(little, argument), query)
+        before = {"GPC": ("LPC", self._sure("GPC")), "GCC": ("LCC", self._sure("GCC"))}
+        for query, (command, argument) in before.items():
+            self._keep(query, command, min(little, argument))
         until_ns, times = self.clock() + round(1e9 * HOMING_S), 0
         try:
             self._ask("V", self.options.speed(self.options.homing_speed_m_s))
@@ -254,8 +254,8 @@ class FaulhaberDriver(Positioner):
                         )
         finally:
             self._ask("V", 0)
-        for setting in before:
-            self._keep(*setting)
+        for query, setting in before.items():
+            self._keep(query, *setting)
 
     # Motion -----------------------------------------------------------------------------------------------------------
 
@@ -349,14 +349,14 @@ class FaulhaberDriver(Positioner):
     def _has(self, bits: Configuration) -> bool:
         return self._sure("CST") & bits == bits
 
-    def _keep(self, command: str, argument: int, query: str) -> None:
+    def _keep(self, query: str, command: str, argument: int) -> None:
         """Set a number and read it back; repeat this once if a digit was damaged on the line."""
         self._ask(command, argument)
         if self._sure(query) != argument:
             self._ask(command, argument)
-            self._same(command, argument, query)
+            self._same(query, command, argument)
 
-    def _same(self, command: str, argument: int, query: str) -> None:
+    def _same(self, query: str, command: str, argument: int) -> None:
         if (found := self._sure(query)) != argument:
             raise PositionerError(f"The drive has {query} {found} after {command}{argument} was set.", hint=_CHANGED)
 
@@ -380,19 +380,21 @@ class FaulhaberDriver(Positioner):
             return
         if self._confirming:
             self._exchange.send("TPOS")
-        elif self._watching and (self._turn or self.moving or self.clock() >= self._polled_ns + STANDING_NS):
-            if self._turn == 0:
-                self._polled_ns = self.clock()
-            self._exchange.send(_WATCHED[self._turn])
+        elif self._watching and self._position is not None:
+            self._exchange.send("OST")
+        elif self._watching and (self.moving or self.clock() >= self._polled_ns + STANDING_NS):
+            self._polled_ns = self.clock()
+            self._exchange.send("POS")
 
     def _take(self, answer: Answer) -> None:
         """Process an answer that no caller waits for; raises an error if it is wrong."""
-        if answer.name in _WATCHED:
-            # The three belong together: after a lost answer they are queried again from the first.
-            self._turn = 0 if answer.line is None else (self._turn + 1) % len(_WATCHED)
-            self._latest[answer.name] = answer
-            if self._turn == 0 and answer.line is not None:
-                self._note_status()
+        if answer.name in ("POS", "OST"):
+            # They belong together: after a lost answer the position is queried again.
+            position, self._position = self._position, None
+            if answer.line is not None and answer.name == "POS":
+                self._position = answer
+            elif answer.line is not None and position is not None:
+                self._note_status(position, OperationStatus(answer.value))
         elif answer.name == "TPOS" and answer.line is not None and self._confirming:
             self._confirming = False
             if answer.value != self.options.increments(self._goal):
@@ -405,10 +407,8 @@ class FaulhaberDriver(Positioner):
             if answer.name == "M":
                 self._acknowledged = self._confirming = True
 
-    def _note_status(self) -> None:
-        """Store position, current and status; a move has ended if the drive reports so after acknowledging it."""
-        position, current, status_ = (self._latest[name] for name in _WATCHED)
-        status = OperationStatus(status_.value)
+    def _note_status(self, position: Answer, status: OperationStatus) -> None:
+        """Store position and status; a move has ended if the drive reports so after acknowledging it."""
         problem = ", ".join(str(bit.name).lower().replace("_", " ") for bit in status & _PROBLEMS)
         if status & _FAULTS or self._exchange.fault:
             self.enabled = self._exchange.fault = False
@@ -418,21 +418,22 @@ class FaulhaberDriver(Positioner):
             self.options.position_m(position.value),
             idle=self._acknowledged and bool(status & OperationStatus.POSITION_ATTAINED),
             target=self._goal,
-            current_a=current.value * self.options.current_unit_a,
             problem=problem,
         )
 
 
-def _required(options: FaulhaberOptions) -> tuple[list[_Setting], list[_Setting]]:
-    """Return settings and ends of travel as stated by the options; raises RigError if the drive lacks such a value."""
-    stated = (
-        ("SP", options.speed, options.speed_m_s, "GSP"),
-        ("AC", options.acceleration, options.acceleration_m_s2, "GAC"),
-        ("DEC", options.acceleration, options.acceleration_m_s2, "GDEC"),
-        ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m, "GCORRIDOR"),
-        ("LPC", options.current, options.current_limit_a, "GPC"),
-        ("LL", options.increments, options.upper_m, "GPL"),
-        ("LL", options.increments, options.lower_m, "GNL"),
-    )
-    found = [(command, of(value), query) for command, of, value, query in stated if value is not None]
-    return [one for one in found if one[0] != "LL"], [one for one in found if one[0] == "LL"]
+def _stated(options: FaulhaberOptions) -> dict[str, tuple[str, int]]:
+    """Return the stated settings by the query that reads each back: command and argument.
+
+    Raises RigError if the drive lacks such a value.
+    """
+    stated = {
+        "GSP": ("SP", options.speed, options.speed_m_s),
+        "GAC": ("AC", options.acceleration, options.acceleration_m_s2),
+        "GDEC": ("DEC", options.acceleration, options.acceleration_m_s2),
+        "GCORRIDOR": ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m),
+        "GPC": ("LPC", options.current, options.current_limit_a),
+        "GPL": ("LL", options.increments, options.upper_m),
+        "GNL": ("LL", options.increments, options.lower_m),
+    }
+    return {query: (command, of(value)) for query, (command, of, value) in stated.items() if value is not None}

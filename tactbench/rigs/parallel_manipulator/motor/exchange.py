@@ -31,7 +31,7 @@ class Answer(NamedTuple):
     """Outcome of a command: the answer, or its absence."""
 
     name: str
-    argument: int | None
+    command: str
     of: int | None
     """Number that was given to `send` with the command."""
     line: Line | None = None
@@ -44,15 +44,14 @@ class Answer(NamedTuple):
 
     def checked(self) -> Line:
         """Return the line; raises PositionerSilentError if no answer came, MotorRefusalError if the drive refuses."""
-        text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
             raise PositionerSilentError(
-                f"The motor's drive did not answer {text} in time; it may have carried it out.",
+                f"The motor's drive did not answer {self.command} in time; it may have carried it out.",
                 hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
             raise MotorRefusalError(
-                f"The motor's drive refuses {text}: {self.line.text}.",
+                f"The motor's drive refuses {self.command}: {self.line.text}.",
                 hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
             )
         return self.line
@@ -100,8 +99,9 @@ class Exchange:
         """Send a command now, even if answers are outstanding: the drive keeps the order. The answer carries `of`."""
         if not self._out:
             self._since_ns = self._clock()
-        self._link.write(encode(name, argument))
-        self._out.append(Answer(name, argument, of))
+        command = encode(name, argument)
+        self._link.write(command)
+        self._out.append(Answer(name, command.decode().strip(), of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
         """Read lines, waiting at most `timeout_s` for the first byte; return the outcomes of commands.
@@ -131,24 +131,20 @@ class Exchange:
         return found[0]
 
     def greet(self) -> str:
-        """Find the drive: end a partial command on its line, and read its version until two answers agree.
+        """Find the drive: end a partial command on its line, and read its version twice.
 
         Raises
         ------
         LinkTimeout
-            If the drive does not answer.
+            If the drive does not answer, or not twice the same.
         """
         self._link.write(b"\r")
         self.quiet()
-        self.version, before = "", ""
-        for _ in range(5):
-            line = self.ask(MARK).line
-            if line is None:
-                self.quiet()
-            elif line.text == before and line.kind is not Kind.REFUSAL:
-                self.version = before
-                return before
-            before = "" if line is None else line.text
+        self.version = ""
+        first, second = (self.ask(MARK).line for _ in range(2))
+        if first is not None and second is not None and first.text == second.text and first.kind is not Kind.REFUSAL:
+            self.version = first.text
+            return first.text
         raise LinkTimeout(
             f"No drive on {self._link.address} gives the same answer to {MARK} twice.",
             hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "

@@ -49,10 +49,9 @@ def rest_spread(run: Synthesis) -> None:
     if stated is None:
         return
     for track in run.tracks:
-        columns = track.by_kind().get("taxel")
-        if columns:
-            numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
-            track.readings[:, columns] += stated.value * numbers
+        columns = track.by_kind().get("taxel", [])
+        numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
+        track.readings[:, columns] += stated.value * numbers
 
 
 def unit_rest(run: Synthesis) -> None:
@@ -176,10 +175,9 @@ def hum(run: Synthesis) -> None:
         return
     size = run.scene.environment.noise_scale * stated["hum"].value
     low_hz, high_hz = stated["hum_low"].to("Hz"), stated["hum_high"].to("Hz")
-    for track in run.tracks:
-        for column in track.by_kind().get("ac_pressure", []):
-            draws = run.of_recording("hum", track.channels[column].name)
-            track.readings[:, column] += band_noise(track.t_s, size, low_hz, high_hz, draws)
+    for track, column in run.columns("ac_pressure"):
+        draws = run.of_recording("hum", track.channels[column].name)
+        track.readings[:, column] += band_noise(track.t_s, size, low_hz, high_hz, draws)
 
 
 def band_noise(
@@ -234,9 +232,9 @@ def converter(run: Synthesis) -> None:
     for track in run.tracks:
         for column, channel in enumerate(track.channels):
             nuisances = run.nuisances(channel.kind)
-            reading = track.readings[:, column]
-            if nuisances is not None and nuisances.step.value > 0:
-                reading = np.round(reading / nuisances.step.value) * nuisances.step.value
+            reading, step = track.readings[:, column], 0.0 if nuisances is None else nuisances.step.value
+            if step > 0:
+                reading = np.round(reading / step) * step
             lower = -np.inf if channel.lower is None else channel.lower
             upper = np.inf if channel.upper is None else channel.upper
             reading = np.clip(reading, lower, upper)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from tactbench.plugin import FloatArray
+from tactbench.plugin import ChannelKind, FloatArray
 from tactbench.rigs.twin.contact.stages import round_contact_mm
 from tactbench.rigs.twin.effects.heated_core import (
     HeatedCore,
@@ -30,13 +32,10 @@ def contact_heat(run: Synthesis) -> None:
 
 def dc_temperature(run: Synthesis) -> None:
     """Set the channels of steady temperature to the low-passed reading of the thermistor."""
-    for track in run.tracks:
-        for column in track.by_kind().get("dc_temperature", []):
-            reading = _thermistor(run, track, column)
-            rest = track.channels[column].rest
-            if reading is not None:
-                # Tracks start at rest; the thermistor's formula gives the level of this core instead.
-                track.readings[:, column] += reading - (0.0 if rest is None else rest.value)
+    for track, column, reading in _thermistor(run, "dc_temperature"):
+        rest = track.channels[column].rest
+        # Tracks start at rest; the thermistor's formula gives the level of this core instead.
+        track.readings[:, column] += reading - (0.0 if rest is None else rest.value)
 
 
 def ac_temperature(run: Synthesis) -> None:
@@ -45,25 +44,21 @@ def ac_temperature(run: Synthesis) -> None:
     if "thermal_high_pass" not in stated or "thermal_gain" not in stated:
         return
     tau_s, gain = time_constant_s(stated["thermal_high_pass"].to("Hz")), stated["thermal_gain"].to("1")
-    for track in run.tracks:
-        for column in track.by_kind().get("ac_temperature", []):
-            reading = _thermistor(run, track, column)
-            if reading is not None:
-                track.readings[:, column] += gain * (reading - lag(track.t_s, reading, tau_s))
+    for track, column, reading in _thermistor(run, "ac_temperature"):
+        track.readings[:, column] += gain * (reading - lag(track.t_s, reading, tau_s))
 
 
-def _thermistor(run: Synthesis, track: Track, column: int) -> FloatArray | None:
-    """Return the (n,) readings of the thermistor in counts of the channel; None if the spec declares none."""
-    core = HeatedCore.of(run.scene, run.sensor.spec)
-    thermistor = Thermistor.of(run.sensor.spec, track.channels[column].upper or 1.0)
-    if core is None or thermistor is None:
-        return None
-    degc = core.untouched(run.scene, track.t_s)
-    if track.warmth_k is not None:
-        degc = degc + track.warmth_k
-    reading = thermistor.reading(degc)
-    low_pass = run.sensor.spec.parameters.get("thermal_low_pass")
-    return reading if low_pass is None else lag(track.t_s, reading, time_constant_s(low_pass.to("Hz")))
+def _thermistor(run: Synthesis, kind: ChannelKind) -> Iterator[tuple[Track, int, FloatArray]]:
+    """Yield the channels of a kind, and the (n,) readings of the thermistor in their counts; none without one."""
+    core, low_pass = HeatedCore.of(run.scene, run.sensor.spec), run.sensor.spec.parameters.get("thermal_low_pass")
+    for track, column in run.columns(kind):
+        thermistor = Thermistor.of(run.sensor.spec, track.channels[column].upper or 1.0)
+        if core is not None and thermistor is not None:
+            degc = core.untouched(run.scene, track.t_s)
+            reading = thermistor.reading(degc if track.warmth_k is None else degc + track.warmth_k)
+            if low_pass is not None:
+                reading = lag(track.t_s, reading, time_constant_s(low_pass.to("Hz")))
+            yield track, column, reading
 
 
 def thermal_drift(run: Synthesis) -> None:
@@ -77,16 +72,13 @@ def thermal_drift(run: Synthesis) -> None:
     if core is None or coefficient is None:
         return
     per_k = coefficient.to("1/K")
-    for track in run.tracks:
-        if track.warmth_k is None:
-            continue
-        untouched = core.untouched(run.scene, track.t_s)
-        gained = relative_conductivity(untouched + track.warmth_k, per_k)
-        gained = gained / relative_conductivity(untouched, per_k)
-        for column in track.by_kind().get("taxel", []):
-            upper = track.channels[column].upper
-            if upper is not None:
-                track.readings[:, column] = through_divider(track.readings[:, column], gained, upper)
+    for track, column in run.columns("taxel"):
+        upper = track.channels[column].upper
+        if track.warmth_k is not None and upper is not None:
+            untouched = core.untouched(run.scene, track.t_s)
+            gained = relative_conductivity(untouched + track.warmth_k, per_k)
+            gained = gained / relative_conductivity(untouched, per_k)
+            track.readings[:, column] = through_divider(track.readings[:, column], gained, upper)
 
 
 def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) -> FloatArray:

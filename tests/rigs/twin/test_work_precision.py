@@ -1,4 +1,4 @@
-"""A third party's thick soft pad under a flat and a sharp indenter."""
+"""The work-precision diagram of every sensor there is: what one cannot have is a row with its reason."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ import sys
 import numpy as np
 import pytest
 
+from tactbench.core.cost.precision import Skipped, measured
+from tactbench.core.progress import Progress
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
+from tactbench.rigs.twin import work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.preparation import prepare
 from tests.conftest import THIRD_PARTY
 from tests.rigs.twin.conftest import TWIN, q
@@ -24,6 +28,26 @@ def bonded(monkeypatch) -> SensorDescriptor:
     yield acme_tactile.tactbench_sensors()[0]
     for name in [name for name in sys.modules if name.partition(".")[0] == "acme_tactile"]:
         del sys.modules[name]
+
+
+@pytest.fixture
+def _little(monkeypatch):
+    """The same diagram with one contact, two loads and few ways: its rows are judged here, not its numbers."""
+    monkeypatch.setattr(work_precision, "RADII_MM", (10.0,))
+    monkeypatch.setattr(work_precision, "LOADS", 2)
+    monkeypatch.setattr(work_precision, "_REFERENCE", RUNGS["default"])
+
+
+@pytest.mark.usefixtures("_little")
+@pytest.mark.parametrize(("name", "has_it"), [("biotac", False), ("icub", True)])
+def test_it_runs_for_a_skin_and_says_what_it_cannot_have(sensors, name, has_it):
+    found = list(measured(work_precision.study(sensors[name], rounds=1), name, Progress()))
+    skipped = [one for one in found if isinstance(one, Skipped)]
+    points = [one for one in found if one not in skipped]
+    assert "default" in {point.label for point in points}
+    assert all(one.label == "closed-form" and one.reason for one in skipped)
+    assert ("closed-form" in {one.label for one in skipped}) is not has_it
+    assert ("closed-form" in {point.label for point in points}) is has_it
 
 
 @pytest.mark.parametrize("radius", [None, 2.0])
