@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
+from tactbench.core.leaderboard.names import grouped
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.replicates import against_reference
@@ -64,13 +65,11 @@ def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
 def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
     """Return the table of published scores, ours, and their differences."""
     lines = reproduce(registry, rows)
-    stated = [line.published for line in lines if line.published.remark]
-    notes = dict.fromkeys(f"{one.title}: {one.remark}." for one in stated)
+    stated = grouped((line.published for line in lines if line.published.remark), lambda one: one.remark)
+    notes = [f"{', '.join(dict.fromkeys(one.title for one in own))}: {remark}." for remark, own in stated.items()]
     kinds = [line.verdict.replace(" ", "-") for line in lines]
     entries = list(map(_entries, lines))
-    return text_table(
-        "Published numbers, and ours", COLUMNS, entries, numeric=COLUMNS[1:5], notes=list(notes), kinds=kinds
-    )
+    return text_table("Published numbers, and ours", COLUMNS, entries, numeric=COLUMNS[1:5], notes=notes, kinds=kinds)
 
 
 def _entries(line: Reproduction) -> tuple[str, ...]:
