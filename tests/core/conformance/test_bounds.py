@@ -5,14 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactbench.core.conformance import sensor, streams
-from tactbench.core.conformance.check import CheckFailed
+from tactbench.core.conformance import sensor, streams, task
+from tactbench.core.conformance.check import CheckFailed, CheckSkipped
 from tactbench.core.conformance.estimator import question
 from tactbench.core.conformance.recorded import fits
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+from tactbench.core.spec.skin import FoamPad
 
 FORCE = StreamSpec(name="scale", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 PAD = StreamSpec(name="pad", rate_hz=100.0, channels=(ChannelSpec(name="t1", kind="taxel", lower=-100, upper=100),))
@@ -139,3 +140,86 @@ def test_a_state_of_a_skin_holds_the_force_and_is_no_deeper_than_the_skin(name):
         assert (state.deflection_mm / rest).max() == pytest.approx(min(force_n / 3, 0.9), rel=0.05)
         assert state.depth_mm == state.deflection_mm.max()
         assert (state.contact_radius_mm > 0) == (force_n > 0)
+
+
+ICUB = installed().sensors["icub"].spec
+TAXELS = ICUB.streams[0]
+
+
+def found_in(check, **changes):
+    """Return the field that a check of a changed iCub fingertip finds at fault."""
+    return outcome(check.run, SimpleNamespace(spec=ICUB.model_copy(update=changes))).rpartition(".")[2]
+
+
+def taxels(channel=None, **changes):
+    channels = tuple(one.model_copy(update=channel or {}) for one in TAXELS.channels)
+    return (TAXELS.model_copy(update={"channels": channels, **changes}),)
+
+
+@pytest.mark.parametrize(
+    ("changes", "at_fault"),
+    [
+        ({}, ""),
+        ({"streams": taxels(rate_hz=0.1)}, ""),
+        ({"streams": taxels(rate_hz=0.09)}, "rate_hz"),
+        ({"streams": taxels(rate_hz=1e6)}, ""),
+        ({"streams": taxels(rate_hz=1e6 + 0.5)}, "rate_hz"),
+        ({"streams": taxels(rate_hz=None), "link_delay": assumed(250, "ms", "")}, ""),
+        ({"streams": taxels(rate_hz=None), "link_delay": assumed(251, "ms", "")}, "link_delay"),
+        ({"streams": taxels(rate_hz=2.0), "link_delay": assumed(1, "s", "")}, ""),
+        ({"streams": taxels(rate_hz=2.0), "link_delay": assumed(1.1, "s", "")}, "link_delay"),
+        ({"link_delay": assumed(21, "us", "")}, ""),
+        ({"link_delay": assumed(19, "us", "")}, "link_delay"),
+        ({"link_delay": assumed(0, "us", "")}, ""),
+        ({"streams": taxels({"upper": 256})}, "lower, upper"),
+        ({"streams": taxels({"lower": -1})}, "lower, upper"),
+        ({"streams": taxels({"rest": assumed(256, "count", "")})}, "rest"),
+        ({"streams": taxels({"rest": None})}, ""),
+    ],
+)
+def test_limits_rates_and_delays_of_a_spec(changes, at_fault):
+    assert found_in(sensor.limits_are_in_order, **changes) == at_fault
+
+
+@pytest.mark.parametrize(
+    ("channel", "at_fault"),
+    [
+        ({}, ""),
+        ({"normal": (0.0, 0.0, 1.0009)}, ""),
+        ({"normal": (0.0, 0.0, 1.0011)}, "normal"),
+        ({"position_m": (1.0, 0.0, 0.0)}, "position_m"),
+        ({"position_m": TAXELS.channels[0].position_m}, "position_m"),  # all at one place
+        ({"position_m": None}, "skipped"),
+    ],
+)
+def test_places_of_a_spec(channel, at_fault):
+    try:
+        found = found_in(sensor.places_are_on_the_skin, streams=taxels(channel))
+    except CheckSkipped:
+        found = "skipped"
+    assert found == at_fault
+
+
+@pytest.mark.parametrize(
+    ("young_mpa", "thick_mm", "at_fault"),
+    [(199.0, 2, ""), (201.0, 2, "young, thickness"), (0.06, 2, ""), (0.05, 2, "young, thickness")],
+)
+def test_a_skin_yields_by_more_than_a_micrometre_and_less_than_its_thickness(young_mpa, thick_mm, at_fault):
+    layer = FoamPad.model_construct(young=assumed(young_mpa, "MPa", ""), thickness=assumed(thick_mm, "mm", ""))
+    assert found_in(sensor.skin_yields_as_skins_do, skin=layer) == at_fault
+
+
+@pytest.mark.parametrize(
+    ("name", "axes"), [("x1", "x"), ("t3_x", "x"), ("Bx", "x"), ("fz", "z"), ("taxel", ""), ("max", "")]
+)
+def test_axes_in_names_of_channels(name, axes):
+    assert sensor.axes_named(name) == axes
+
+
+@pytest.mark.parametrize(
+    ("labels", "values", "together"),
+    [([1, 2, 3], [5, 6, 9], True), ([1, 2, 3], [9, 6, 5], True), ([0, 0, 1], [1, 2, 3], True),
+     ([1, 2, 3], [1, 3, 2], False), ([1, 1, 1], [1, 2, 3], False)],
+)  # fmt: skip
+def test_numbers_that_rise_or_fall_together(labels, values, together):
+    assert task._go_together(labels, values) is together
