@@ -24,7 +24,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
-from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
+from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
 
@@ -57,7 +57,7 @@ def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
         f"no table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
         f"{rounds * len(RADII_MM)} whole recordings, nothing kept from the one before.",
         jobs=[
-            CostJob(name, functools.partial(_measured, sensor, scenes, name, truth, rounds), name)
+            CostJob(name, functools.partial(_measured, sensor, scenes, name, truth, rounds))
             for name in RUNGS
             if name != "reference"
         ],
@@ -102,9 +102,6 @@ def _measured(
                 worst=float(np.abs(own).max()),
                 unit=next(channel.unit for channel in sensor.spec.channels(kind)),
                 floor=math.inf if nuisances is None else nuisances.hidden() or math.inf,
-                default=fidelity == DEFAULT,
-                rung=rung,
-                settings={"family": rung},
             )
         )
     return found

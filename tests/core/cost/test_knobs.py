@@ -125,7 +125,7 @@ def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
 def cost_point(seconds, error, *, subject="pad"):
     return CostPoint(
         subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=0.3, default=False, rung="", settings={},
+        floor=0.3,
     )  # fmt: skip
 
 
