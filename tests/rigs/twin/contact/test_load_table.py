@@ -78,13 +78,6 @@ def test_rest_is_exact_tiny_loads_are_continuous_and_loads_beyond_are_held(specs
     np.testing.assert_allclose(table(np.array([1e-9]))[0], rest, atol=1e-5)
 
 
-def test_a_scene_without_load_solves_nothing(specs):
-    press = _press(specs["icub"], 10.0, -0.3)
-    table = build_table(press, lambda state: np.array([state.depth_mm]), largest_n=0.0, tolerance=np.ones(1))
-    assert not press._solutions
-    np.testing.assert_array_equal(table(np.zeros(4)), np.zeros((4, 1)))
-
-
 @given(st.lists(st.floats(0.05, 1.0), min_size=1, max_size=12), st.data())
 def test_monotone_nodes_give_a_monotone_interpolant(steps, data):
     x = np.concatenate([[0.0], np.cumsum(steps)])
