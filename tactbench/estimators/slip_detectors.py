@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.estimators.nonlinear import EveryNth
-from tactbench.plugin import NotApplicable, StreamReadings
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.plugin import FloatArray
+from tactbench.plugin import FloatArray, NotApplicable, StreamReadings
 
 LEVELS = 5
 """Largest number of levels of the wavelet transform: five levels reach down to 34 Hz at a rate of 2.2 kHz."""

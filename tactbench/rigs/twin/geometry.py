@@ -58,8 +58,8 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
             hint=f"Give positive, finite sides and radius, and at least {_FEWEST_CELLS} cells along x and s.",
         )
     dx, ds = (x_max - x_min) / along, arc / across
-    x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
-    s: FloatArray = np.asarray(-arc / 2 + (np.arange(across) + 0.5) * ds, dtype=np.float64)
+    x: FloatArray = x_min + (np.arange(along, dtype=np.float64) + 0.5) * dx
+    s: FloatArray = -arc / 2 + (np.arange(across, dtype=np.float64) + 0.5) * ds
     return SkinGrid(x_mm=x, s_mm=s)
 
 

@@ -31,7 +31,7 @@ def sliding_stiffness(contact_radius_mm: FloatArray, shear_mpa: float) -> FloatA
     The formula holds for any force if tractions are proportional to the pressure, as in full slip; a contact that
     sticks everywhere is stiffer by half, ``8 a G*`` (Johnson 7.44).
     """
-    return np.asarray(16.0 / 3.0 * contact_radius_mm * shear_mpa)
+    return 16.0 / 3.0 * contact_radius_mm * shear_mpa
 
 
 def share_of_force(travelled: FloatArray) -> FloatArray:
@@ -40,9 +40,9 @@ def share_of_force(travelled: FloatArray) -> FloatArray:
     This is Johnson 7.42 solved for the force. Both shares count from the last state with tractions proportional to the
     pressure, at rest or at the end of a slip: Cattaneo's argument holds from either.
     """
-    return np.asarray(1.0 - (1.0 - np.clip(travelled, 0.0, 1.0)) ** 1.5)
+    return 1.0 - (1.0 - np.clip(travelled, 0.0, 1.0)) ** 1.5
 
 
 def stick_ratio(travelled: FloatArray) -> FloatArray:
     """Return c/a from the share s of full slip's displacement: ``(1 - Q/mu P)^(1/3) = sqrt(1 - s)`` (Johnson 7.39)."""
-    return np.asarray(np.sqrt(1.0 - np.clip(travelled, 0.0, 1.0)))
+    return np.sqrt(1.0 - np.clip(travelled, 0.0, 1.0))

@@ -123,16 +123,6 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
     return signed
 
 
-def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reason:
-    reason = load_object(effect.called_for)(scene, sensor)
-    if not isinstance(reason, Reason):
-        raise PluginContractError(
-            f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
-            hint="Return tactbench.plugin.Reason(called_for, text).",
-        )
-    return reason
-
-
 def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     present = {channel.kind for channel in sensor.channels()}
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
@@ -151,7 +141,14 @@ def _needed(
 
     Only an included effect makes the tokens that it consumes needed.
     """
-    reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
+    reasons: dict[str, Reason] = {}
+    for effect in effects:
+        reasons[effect.name] = reason = load_object(effect.called_for)(scene, sensor)
+        if not isinstance(reason, Reason):
+            raise PluginContractError(
+                f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
+                hint="Return tactbench.plugin.Reason(called_for, text).",
+            )
     taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
     needed = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
     before: set[str] = set()

@@ -283,5 +283,4 @@ def _stored(readings: FloatArray, stream: StreamSpec, channels: tuple[ChannelSpe
             f"Channel {worst} of stream {stream.name} leaves the range of {stream.dtype}.",
             hint="State lower and upper in the channel's spec, or a wider dtype in the stream's.",
         )
-    stored: npt.NDArray[np.generic] = np.rint(readings).astype(dtype)
-    return stored
+    return np.rint(readings).astype(dtype)

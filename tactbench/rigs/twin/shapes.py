@@ -66,7 +66,7 @@ class Shape:
         """Return the absolute slope [1] of the shape at places (x, s) relative to its axis."""
         along = self.height_mm(x_mm + _STEP_MM, s_mm) - self.height_mm(x_mm - _STEP_MM, s_mm)
         across = self.height_mm(x_mm, s_mm + _STEP_MM) - self.height_mm(x_mm, s_mm - _STEP_MM)
-        return np.asarray(np.hypot(along, across) / (2 * _STEP_MM), dtype=np.float64)
+        return np.hypot(along, across) / (2 * _STEP_MM)
 
 
 def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Shape | None:
@@ -112,7 +112,7 @@ def edge(x_mm: FloatArray, y_mm: FloatArray, *, wedge_angle: float, tip_radius: 
     slope = 1.0 / math.tan(math.radians(wedge_angle) / 2)
     away = np.abs(y_mm + 0.0 * x_mm)
     if tip_radius == 0:
-        return np.asarray(slope * away)
+        return slope * away
     leaves = tip_radius * slope / math.hypot(1.0, slope)
     return sag_mm(np.minimum(away, leaves) ** 2, tip_radius) + slope * np.maximum(away - leaves, 0.0)
 

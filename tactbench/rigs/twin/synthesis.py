@@ -48,7 +48,7 @@ class Load:
 
     def at(self, t_s: FloatArray) -> FloatArray:
         """Return the (n,) normal force at (n,) seconds since the recording's first sample."""
-        return np.asarray(np.interp(t_s, self.t_s, self.force_n), dtype=np.float64)
+        return np.interp(t_s, self.t_s, self.force_n)
 
     @property
     def largest_n(self) -> float:

@@ -112,19 +112,13 @@ class BioTacDriver(Driver):
     def _set_up(self) -> None:
         """Reset the driver to frame position 0 and no pending batches."""
         options = self._options
-        try:
-            self._batches = FrameBatches(
-                options.frame,
-                speed_hz=self._link.speed_hz,
-                select=options.select,
-                resends=options.resends,
-                words=options.batch_words,
-            )
-        except ValueError as error:
-            raise RigError(
-                f"{self._link.address} is too slow for a BioTac: {error}.",
-                hint=f"Choose a faster clock, or fewer resends than {options.resends}.",
-            ) from error
+        self._batches = FrameBatches(
+            options.frame,
+            speed_hz=self._link.speed_hz,
+            select=options.select,
+            resends=options.resends,
+            words=options.batch_words,
+        )
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
         self._last: tuple[int, int] | None = None

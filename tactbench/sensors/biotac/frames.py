@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
-from tactbench.plugin import Block, Quality, Source, StreamSpec
+from tactbench.plugin import Block, Quality, RigError, Source, StreamSpec
 from tactbench.plugin.devices import SpiStep
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, NAMES, STREAMS
 from tactbench.sensors.biotac.codec import (
@@ -27,9 +27,6 @@ from tactbench.sensors.biotac.codec import (
     decoded,
     sampling_command,
 )
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 DEFAULT_FRAME: tuple[str, ...] = tuple(
     name for slow in (*NAMES, "PDC", "TAC", "TDC") for name in (slow, "PAC")
@@ -182,7 +179,7 @@ class FrameBatches(FrameRows):
 
     Raises
     ------
-    ValueError
+    RigError
         If `speed_hz` leaves no time for the words.
     """
 
@@ -207,9 +204,10 @@ class FrameBatches(FrameRows):
         self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
         self._within_us = self._commands * self._command_us + resends * self._word_us
         if self._paused_us(1) < self._within_us + self._word_us:
-            raise ValueError(
-                f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
-                f"fit into the time of a word, 1/{rate_hz} s"
+            raise RigError(
+                f"A clock of {speed_hz} Hz is too slow for a BioTac: {self._commands} x {self._command_us} us, the "
+                f"pauses between and {bits} bits do not fit into the time of a word, 1/{rate_hz} s.",
+                hint=f"Choose a faster clock, or fewer resends than {resends}.",
             )
         self.counts: Counter[str] = Counter()
 

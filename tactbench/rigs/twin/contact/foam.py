@@ -68,7 +68,7 @@ def _covered(centres: FloatArray, low: float, high: float) -> FloatArray:
     """Return the (n,) shares, 0 to 1, of cells with (n,) `centres` that lie between `low` and `high`."""
     step = float(centres[1] - centres[0])
     ends = np.minimum(centres + step / 2, high) - np.maximum(centres - step / 2, low)
-    return np.asarray(np.clip(ends / step, 0.0, 1.0))
+    return np.clip(ends / step, 0.0, 1.0)
 
 
 def medium(skin: FoamPad, grid: SkinGrid) -> Medium:

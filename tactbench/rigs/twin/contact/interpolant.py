@@ -45,34 +45,23 @@ class Interpolant:
     def __init__(
         self, loads: Sequence[float], values: Sequence[FloatArray], touch_down: tuple[float, float] | None = None
     ) -> None:
+        from scipy.interpolate import CubicHermiteSpline, PPoly
+
         self.loads = np.array(loads)
         last = self.loads.size - 1
         breaks = [last] if touch_down is None else [loads.index(load) for load in touch_down]
         self._bent_from = float(loads[breaks[-1]])
         self._x = self._bent(self.loads)
-        edges = sorted({0, *breaks, last})
-        table = np.stack(values)
-        coefficients = []
-        for low, high in itertools.pairwise(edges):
-            x, y = self._x[low : high + 1], table[low : high + 1]
-            d = slopes(x, y)
-            h = np.diff(x)[:, None]
-            secant = np.diff(y, axis=0) / h
-            coefficients.append(
-                np.stack([y[:-1], d[:-1], (3 * secant - 2 * d[:-1] - d[1:]) / h, (d[:-1] + d[1:] - 2 * secant) / h**2])
-            )
-        self._cubics = np.concatenate(coefficients, axis=1)
+        edges, table = sorted({0, *breaks, last}), np.stack(values)
+        parts = [slice(low, high + 1) for low, high in itertools.pairwise(edges)]
+        cubics = [
+            CubicHermiteSpline(self._x[part], table[part], slopes(self._x[part], table[part])).c for part in parts
+        ]
+        self._cubics = PPoly(np.concatenate(cubics, axis=1), self._x)
 
     def __call__(self, load: FloatArray) -> FloatArray:
         """Return the (m, c) values at (m,) loads within the nodes' range."""
-        at = np.clip(np.searchsorted(self.loads, load, side="right") - 1, 0, self.loads.size - 2)
-        t = (self._bent(load) - self._x[at])[:, None]
-        a, b, c, d = self._cubics
-        out: FloatArray = d[at]
-        for lower in (c, b, a):
-            out *= t
-            out += lower[at]
-        return out
+        return np.asarray(self._cubics(self._bent(load)))
 
     def steepest(self, low: float, high: float) -> FloatArray:
         """Return (c,) upper bounds of the absolute slopes between two loads within the nodes' range.
@@ -82,7 +71,7 @@ class Interpolant:
         """
         first, last = np.searchsorted(self.loads, [low, high], side="right") - 1
         at = np.arange(min(first, self.loads.size - 2), min(last, self.loads.size - 2) + 1)
-        _, b, c, d = self._cubics[:, at]
+        d, c, b, _ = self._cubics.c[:, at]
         end = np.diff(self._x)[at][:, None]
         vertex = np.clip(-c / np.where(d != 0, 3 * d, np.inf), 0.0, end)
         parabola = [np.abs(b + t * (2 * c + 3 * d * t)) for t in (0.0, vertex, end)]
@@ -97,7 +86,7 @@ class Interpolant:
         if self._bent_from == self.loads[-1]:
             return np.ones_like(load)
         # At the break itself either side may be meant: the steeper.
-        return np.asarray(np.where(beyond < 0, 1.0, np.where(beyond > 0, bent, np.maximum(bent, 1.0))))
+        return np.where(beyond < 0, 1.0, np.where(beyond > 0, bent, np.maximum(bent, 1.0)))
 
     def _bent(self, load: FloatArray) -> FloatArray:
         """Return the variable of the cubics: the load up to the break, then the break's load plus the bent distance."""

@@ -62,7 +62,7 @@ class Spectrum:
         """Return the (nx, ns) field of a (size,) vector."""
         np.multiply(vector.view(np.complex128).reshape(self.half), self._backward, out=self._buffer)
         if self.mirrored:
-            return np.asarray(self._cosines.T @ np.fft.irfft(self._buffer, self.shape[1]))
+            return self._cosines.T @ np.fft.irfft(self._buffer, self.shape[1])
         real: FloatArray = np.fft.irfft(np.fft.ifft(self._buffer, axis=0), self.shape[1])
         return real
 
@@ -128,8 +128,7 @@ class LowModes:
 
     def take(self, vector: FloatArray) -> FloatArray:
         """Return the (size,) coefficients of the low modes in a flat vector."""
-        taken: FloatArray = vector[self._places] * self._scales
-        return taken
+        return np.asarray(vector[self._places] * self._scales)
 
     def put(self, coefficients: FloatArray, vector: FloatArray) -> None:
         """Overwrite the low modes of a flat vector by their (size,) coefficients."""

@@ -82,7 +82,7 @@ class _Spectral:
     def filtered(self, field: FloatArray, multiplier: npt.NDArray[np.complex128]) -> FloatArray:
         """Return the (2, nx, ns) fields whose modes are those of (nx, ns) `field` times (2, nx, ns//2+1) factors."""
         whole = np.concatenate([field, field[::-1]]) if self._mirrored else field
-        return np.asarray(np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells])
+        return np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells]
 
 
 class _Shell(TangentialResponse):

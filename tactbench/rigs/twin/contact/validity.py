@@ -106,5 +106,4 @@ def _active(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_]:
     else:
         low, high, arc = (edge.to("mm") for edge in sheet.pad)
         along, across = (x_mm >= low) & (x_mm <= high), s_mm <= arc / 2
-    active: npt.NDArray[np.bool_] = along[:, None] & across[None, :]
-    return active
+    return np.asarray(along[:, None] & across[None, :])

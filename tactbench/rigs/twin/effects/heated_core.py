@@ -92,7 +92,7 @@ def disc_conductance_w_per_k(radius_mm: FloatArray, conductivity_w_per_m_k: floa
 
     Carslaw and Jaeger 1959, Conduction of heat in solids, chapter 8; without a contact it is 0.
     """
-    return np.asarray(4e-3 * conductivity_w_per_m_k * radius_mm, dtype=np.float64)
+    return 4e-3 * conductivity_w_per_m_k * radius_mm
 
 
 def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatArray:
@@ -100,7 +100,7 @@ def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatAr
 
     The result is at least 0.1, where the formula would leave the range of liquids (below -20 degC for 2 % per kelvin).
     """
-    return np.asarray(np.maximum(1.0 + coefficient_per_k * (degc - 25.0), 0.1))
+    return np.maximum(1.0 + coefficient_per_k * (degc - 25.0), 0.1)
 
 
 @dataclass(frozen=True)
@@ -128,4 +128,4 @@ class Thermistor:
         """Return the readings [count] at temperatures [degC]: full scale times ``p / (exp(b/T) + q)``, T in kelvin."""
         # Above absolute zero by a kelvin: colder than that, the exponential overflows.
         kelvin = np.maximum(np.asarray(degc, dtype=np.float64) + _ICE_K, 10.0)
-        return np.asarray(self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q))
+        return self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q)

@@ -68,7 +68,7 @@ def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
     back = (mode.omega**2 * u + r * speed) / w
     highest = np.arctan2(r * speed + back * w, r * back - speed * w) + math.pi
     _, velocity = swing(mode, u, np.full_like(u, speed), highest / w)
-    return np.asarray((u > 0) & (velocity >= speed))
+    return (u > 0) & (velocity >= speed)
 
 
 def slip_s(mode: Mode, u: float, speed: float) -> float:

@@ -103,7 +103,7 @@ class Dragged:
             return np.zeros(drive.t_s.size, dtype=bool)
         fall = (drive.static - drive.kinetic) / drive.stribeck_mm_s
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
-        return np.asarray(drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness)
+        return drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness
 
     def _add(self, t_s: float, kind: int, x_mm: float, about_mm: float = 0.0, friction: float = 0.0) -> None:
         self._phases.append((t_s, kind, x_mm, about_mm, friction))
@@ -240,7 +240,7 @@ def coefficient(speed_mm_s: FloatArray, static: float, kinetic: float, stribeck_
     """
     if stribeck_mm_s < COULOMB_MM_S:
         return np.where(speed_mm_s == 0, static, kinetic)
-    return np.asarray(kinetic + (static - kinetic) * np.exp(-np.abs(speed_mm_s) / stribeck_mm_s))
+    return kinetic + (static - kinetic) * np.exp(-np.abs(speed_mm_s) / stribeck_mm_s)
 
 
 def bristle(
