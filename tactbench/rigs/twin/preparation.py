@@ -116,9 +116,14 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
         if stream.rate_hz is None or at_least <= stream.rate_hz < _OWN_CLOCK_FROM * slowest
     )
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
-        channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
-        if not channels:
+        kept = tuple(
+            stream.model_copy(update={"channels": own})
+            for stream in streams
+            if (own := tuple(channel for channel in stream.channels if channel.kind in plan.kinds))
+        )
+        if not kept:
             continue
+        channels = tuple(channel for stream in kept for channel in stream.channels)
         rate = streams[0].rate_hz if clock else None
         if rate is not None and not duration * rate <= MOST_SAMPLES:
             raise RigError(
@@ -128,6 +133,7 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
         own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
         yield Track(
             clock=clock,
+            streams=kept,
             channels=channels,
             t_s=own,
             force_n=load.at(own),

@@ -18,6 +18,7 @@ from tactbench.plugin import (
     Scalar,
     Scene,
     SensorDescriptor,
+    StreamSpec,
     load_object,
 )
 from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances, Skin
@@ -89,8 +90,10 @@ class Track:
 
     clock: str
     """Name of the stream that has this clock for itself; empty for the scene's reference clock."""
+    streams: tuple[StreamSpec, ...]
+    """The sensor's streams on this clock, limited to the recorded channels."""
     channels: tuple[ChannelSpec, ...]
-    """Channels in the order of the sensor's streams."""
+    """Channels of all these streams, in order."""
     t_s: FloatArray
     """(n,) seconds since the recording's first sample."""
     force_n: FloatArray
