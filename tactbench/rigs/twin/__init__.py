@@ -33,8 +33,8 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("force-loop", "Motor under force control", "effects.force_loop:apply", "", "load reference-force"),
         _effect("contact", "Normal contact", "contact.stages:press_skin", "load core", "skin"),
         _effect("core", "Touch-down on the core", "contact.shell:with_core", "", "core"),
-        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", "skin", "dc_pressure fluid"),
-        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", "", "shear"),
+        _effect("fluid-pressure", "Fluid pressure", "contact.press:Press", "skin", "dc_pressure fluid"),
+        _effect("shear", "Tangential state of the skin", "contact.tangential:tangential_of", "", "shear"),
         _channels("gain", "Scatter of gains", produces="gain"),
         _effect("creep", "Creep of the skin", "effects.creep:apply", "load skin gain", "effective-force"),
         _effect(

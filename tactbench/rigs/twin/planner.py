@@ -28,8 +28,8 @@ STORED = "stored"
 """Name of the result "stored samples", which every recording needs."""
 REFERENCE = "reference-force"
 """Name of the result "reference force", which every recording needs."""
-LENT = "core"
-"""Name of the result of effects that the contact solver itself applies when a load needs them."""
+LENT = ("core", "fluid-pressure", "shear")
+"""Names of the effects that the contact solver itself applies, or applies when a load needs them."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Plan:
     """Included effects in the order of application, followed by the effects left out."""
     stages: tuple[EffectDescriptor, ...]
     """Descriptors of the effects to apply, in order."""
-    lent: Mapping[str, str]
-    """Effects that the contact solver may apply: name -> ``module:callable``."""
+    lent: frozenset[str]
+    """Names of the included effects that the contact solver applies."""
 
     def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
         """Return the entries, after replacing those that could be decided only after the contact was solved."""
@@ -93,8 +93,8 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     return Plan(
         kinds=kinds,
         entries=tuple(entries[effect.name] for effect in (*ordered, *left_out)),
-        stages=tuple(effect for effect in ordered if LENT not in effect.produces),
-        lent={effect.name: effect.where for effect in ordered if LENT in effect.produces},
+        stages=tuple(effect for effect in ordered if effect.name not in LENT),
+        lent=frozenset(effect.name for effect in ordered).intersection(LENT),
     )
 
 

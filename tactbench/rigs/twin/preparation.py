@@ -70,7 +70,7 @@ def prepare(
         tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0, shape=shape_of(scene.indenter, indenters)),
         reference_n=load.at(t_s),
-        lent=dict(plan.lent),
+        lent=plan.lent,
         forced=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
         fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
@@ -117,9 +117,9 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
     )
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
         kept = tuple(
-            stream.model_copy(update={"channels": own})
+            stream.model_copy(update={"channels": wanted})
             for stream in streams
-            if (own := tuple(channel for channel in stream.channels if channel.kind in plan.kinds))
+            if (wanted := tuple(channel for channel in stream.channels if channel.kind in plan.kinds))
         )
         if not kept:
             continue

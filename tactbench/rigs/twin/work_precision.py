@@ -132,7 +132,6 @@ def _loads() -> FloatArray:
 def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
     """Return the (loads, channels) changes from rest with the reference settings, each load solved by itself."""
     run = prepare(sensor, scene, 1, plan, _REFERENCE)
-    run.fluid_pressure = "dc_pressure" in scene.observe
     press, read = pressed(run, names, _REFERENCE)
     rest = read(press(0.0))
     return np.stack([read(press(float(load))) - rest for load in _loads()])

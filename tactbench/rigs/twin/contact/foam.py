@@ -63,7 +63,7 @@ def _covered(centres: FloatArray, own: FloatArray, low: float, high: float) -> F
     step, half = float(centres[1] - centres[0]), float(own[1] - own[0]) / 2
     inside = own[(own >= low) & (own <= high)]
     ends = np.minimum(centres + step / 2, inside[-1] + half) - np.maximum(centres - step / 2, inside[0] - half)
-    return np.clip(ends / step, 0.0, 1.0)
+    return np.asarray(np.clip(ends / step, 0.0, 1.0))
 
 
 def medium(skin: FoamPad, grid: SkinGrid) -> Medium:

@@ -35,7 +35,7 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
         return
     # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
     spec, body = run.sensor.model_dump_json(), (run.contact.radius_mm, run.contact.shape)
-    key = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{run.tangential}|{slide_of(run)}"
+    key = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{slide_of(run)}"
     if key not in _CHOSEN:
         _CHOSEN[key] = _cheapest(run, names, largest_n, tolerance)
     run.rung, run.rung_error = _CHOSEN[key]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -38,24 +37,15 @@ _TABLES: dict[str, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
-    """Raise an error for a contact that the grid cannot resolve; the solver runs when a reading is first needed."""
+    """Solve the contact for the loads of the recording; raise an error if the grid cannot resolve it."""
     sheet = run.skin.sheet
     check_contact(skin_grid(sheet, run.fidelity.cells(sheet)), run.contact)
+    skin_under_load(run)
 
 
 def forget_tables() -> None:
     """Drop all load tables that this process has kept: the next recording solves its contact again."""
     _TABLES.clear()
-
-
-def watch_fluid(run: Synthesis) -> None:
-    """Request that every solved load states the pressure of the fluid in the skin."""
-    run.fluid_pressure = True
-
-
-def watch_shear(run: Synthesis) -> None:
-    """Request that every solved load states the tangential displacement and traction of the skin."""
-    run.tangential = True
 
 
 def read_skin(run: Synthesis) -> None:
@@ -84,10 +74,7 @@ def read_skin(run: Synthesis) -> None:
 
 
 def skin_under_load(run: Synthesis) -> LoadTable:
-    """Return the load table of this recording's skin and channels; it is solved once.
-
-    The table holds the fluid's pressure only if that was requested before the first call.
-    """
+    """Return the load table of this recording's skin and channels; it is solved once."""
     return _tables(run).table
 
 
@@ -129,12 +116,11 @@ def read_names(run: Synthesis) -> list[str]:
 def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: bool = False) -> _Tabulated:
     spec, tolerance = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
-        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
-        f"|{run.tangential}|{slide_of(run)}"
+        f"{spec}|{run.contact}|{largest!r}|{names}|{sorted(run.lent)}|{run.fidelity}|{tolerance}|{only_skin}"
+        f"|{slide_of(run)}"
     )
     if text in _TABLES:
         return _TABLES[text]
-    began = time.perf_counter()
     press, read = pressed(run, names, run.fidelity)
     tolerances, nodes = _tolerance(run, names), run.fidelity.most_nodes
     table = build_table(press, read, largest_n=largest, tolerance=tolerances, most_nodes=nodes)
@@ -147,10 +133,6 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
         check_reach(press, largest, run.skin.sheet)
     remarked = remarks(press, largest, run.skin.sheet)
     made = _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
-    # Whichever effect needs the table first, its time is that of the contact.
-    spent = time.perf_counter() - began
-    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
-    run.elsewhere_s += spent
     if len(_TABLES) == _MOST_TABLES:
         del _TABLES[next(iter(_TABLES))]
     _TABLES[text] = made
