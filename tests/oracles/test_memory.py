@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.heat import HeatedCore
 
 CORE = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)
 

@@ -15,10 +15,9 @@ from tactbench.plugin import FloatArray, PlanEntry, Quantity, Scene, SensorDescr
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, Verdict, rig_context
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of, press_of
-from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.heat import HeatedCore
 from tactbench.rigs.twin.effects.memory import lag
-from tactbench.rigs.twin.effects.skin_mode import Mode
-from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive, Mode
 from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tactbench.rigs.twin.preparation import carried_out, prepare

@@ -13,7 +13,6 @@ from tactbench.plugin.devices import (
     DriverSettings,
     LinkError,
 )
-from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BoardSetup,
     OldSetup,
@@ -25,6 +24,7 @@ from tactbench.sensors.icub.codec import (
 )
 from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver
 from tactbench.sensors.icub.emulator import BoardFault
+from tactbench.sensors.icub.spec import STREAMS
 from tests.sensors.icub.emulated import (
     NAMES,
     VirtualLink,

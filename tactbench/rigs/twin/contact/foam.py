@@ -6,8 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FoamPad, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import Medium, Spectrum
 from tactbench.rigs.twin.geometry import skin_grid
 
 CUT_OVER = 0.97

@@ -6,8 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import Medium, Spectrum
 
 _SERIES_BELOW = 0.35
 """Limit of q below which the numerator is summed as a series, because ``sinh y - y`` would cancel."""

@@ -8,7 +8,7 @@ from tactbench.plugin import FloatArray, Quantity, assumed
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, round_contact_mm, skin_under_load
 from tactbench.rigs.twin.effects.friction import mode_of
-from tactbench.rigs.twin.effects.skin_mode import shaken
+from tactbench.rigs.twin.effects.stick_slip import shaken
 from tactbench.rigs.twin.synthesis import Synthesis
 
 LIFT: Quantity = assumed(

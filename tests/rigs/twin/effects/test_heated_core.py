@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Scene, assumed
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin.effects.heated_core import (
+from tactbench.rigs.twin.effects.heat import (
     HeatedCore,
     Thermistor,
 )

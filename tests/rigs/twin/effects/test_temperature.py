@@ -10,8 +10,7 @@ from tactbench.plugin import ForceRamp, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.contact.press import at_rest
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.effects.heat import through_divider
-from tactbench.rigs.twin.effects.heated_core import HeatedCore, Thermistor
+from tactbench.rigs.twin.effects.heat import HeatedCore, Thermistor, through_divider
 from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 from tactbench.rigs.twin.geometry import skin_grid
 from tactbench.rigs.twin.planner import plan_scene
