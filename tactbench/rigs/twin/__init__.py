@@ -63,7 +63,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("friction", "Friction", "effects.friction:apply", "skin", "slip tangential-force reference-force"),
         _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", "slip skin", "vibration"),
         _effect(
-            "ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", "skin fluid vibration",
+            "ac-pressure", "Dynamic pressure", "effects.skin_vibration:ac_pressure", "skin fluid vibration",
             "ac_pressure reading",
         ),
         _channels("hum", "Hum of dynamic pressure", group="noise"),
@@ -104,7 +104,7 @@ def tactbench_indenters() -> list[IndenterDescriptor]:
 
 
 def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescriptor:
-    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
+    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.geometry:{name}", dimensions=dimensions)
 
 
 def _effect(name: str, title: str, where: str, consumes: str, produces: str, group: str = "") -> EffectDescriptor:

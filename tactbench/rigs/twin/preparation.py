@@ -19,9 +19,8 @@ from tactbench.plugin import (
     SensorSpec,
 )
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
-from tactbench.rigs.twin.geometry import Contact, radius_mm
+from tactbench.rigs.twin.geometry import Contact, radius_mm, shape_of
 from tactbench.rigs.twin.planner import Plan
-from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 _OWN_CLOCK_FROM = 2.0

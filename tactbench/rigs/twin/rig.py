@@ -30,9 +30,9 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
+from tactbench.rigs.twin.geometry import shape_of
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
-from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
 _CURVE_POINTS = 4001

@@ -63,8 +63,7 @@ from tactbench.sensors.biotac.codec import (
     property_command,
     property_text,
 )
-from tactbench.sensors.biotac.frames import FrameBatches, streams_of
-from tactbench.sensors.biotac.options import BioTacOptions
+from tactbench.sensors.biotac.frames import BioTacOptions, FrameBatches, streams_of
 
 PATIENCE_S = 0.5
 """Seconds (assumed) after the end of a batch until its reply counts as lost. USB and a busy host take less."""
@@ -76,7 +75,7 @@ class BioTacDriver(Driver):
     Parameters
     ----------
     settings
-        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.options.BioTacOptions`.
+        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.frames.BioTacOptions`.
 
     Raises
     ------

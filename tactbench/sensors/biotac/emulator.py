@@ -36,7 +36,7 @@ from tactbench.sensors.biotac.codec import (
     encoded,
     parity_holds,
 )
-from tactbench.sensors.biotac.options import BioTacOptions
+from tactbench.sensors.biotac.frames import BioTacOptions
 
 _ROUNDING_S = 1e-9
 """Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""

@@ -28,7 +28,7 @@ from tactbench.plugin.simulation import (
     TransducerFactory,
 )
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import AnyPress, Press, whole_skin
+from tactbench.rigs.twin.contact.press import AnyPress, LocalPress, Press, whole_skin
 from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -68,8 +68,6 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     gap = gap_mm(grid, run.contact, skin.sheet)
     if fidelity.solver == "local":
-        from tactbench.rigs.twin.contact.local import LocalPress
-
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
     core = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):

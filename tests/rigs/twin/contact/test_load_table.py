@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin import load_object
-from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.load_table import build_table
+from tactbench.rigs.twin.contact.load_table import Interpolant, build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.shell import with_core
 from tactbench.rigs.twin.geometry import Contact, gap_mm
