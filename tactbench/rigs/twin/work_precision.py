@@ -123,13 +123,12 @@ def _planned(sensor: SensorDescriptor, effects: Sequence[EffectDescriptor], radi
 def _loads() -> FloatArray:
     # The golden ratio's multiples fill an interval evenly and never fall on a table's nodes.
     places = (0.5 + np.arange(1, LOADS + 1) * (math.sqrt(5) - 1) / 2) % 1.0
-    return np.asarray(5.0 * np.sort(places), dtype=np.float64)
+    return 5.0 * np.sort(places)
 
 
 def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
     """Return the (loads, channels) changes from rest with the reference settings, each load solved by itself."""
     run = prepare(sensor, scene, 1, plan, _REFERENCE)
-    run.fluid_pressure = "dc_pressure" in scene.observe
     press, read = pressed(run, names, _REFERENCE)
     rest = read(press(0.0))
     return np.stack([read(press(float(load))) - rest for load in _loads()])
