@@ -12,6 +12,7 @@ from tactbench.plugin import RigError, load_registry
 
 from .cases import judge
 from .families import families
+from .many import main
 
 FAMILIES = families()
 EXAMPLES = {"contact": 5, "memory": 20, "channels": 5, "evaluation": 1}
@@ -76,7 +77,10 @@ def test_the_judge(family, verdict):
     assert bool(outcome.detail) == (verdict != "passed")
 
 
-def test_the_same_numbers_give_the_same_case():
-    first, again, other = (judge("contact: any radius", FAMILIES["contact: any radius"], 3, n) for n in (5, 5, 6))
-    assert first == again
-    assert first.drawn != other.drawn
+def test_the_same_numbers_give_the_same_case_in_a_worker_too(capsys):
+    name = "memory: no time constant"
+    assert main(["--only", name, "--case", "5", "--seed", "3", "--workers", "1"]) == 0
+    outcome = judge(name, FAMILIES[name], 3, 5)
+    assert f"{name} 5: refused {outcome.detail}" in capsys.readouterr().out
+    other = "contact: any radius"
+    assert judge(other, FAMILIES[other], 3, 5).drawn != judge(other, FAMILIES[other], 3, 6).drawn
