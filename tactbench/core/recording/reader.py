@@ -213,9 +213,8 @@ def _columns(path: Path, spec: StreamSpec, group: Any) -> dict[str, Any]:
     columns |= {_NOTE + name: item for name, item in group.get("annotations", {}).items()}
     rows, *rest = group["data"].shape
     stored = group["data"].dtype.newbyteorder("=")
-    if (stored, rest) != (np.dtype(spec.dtype), [len(spec.channels)]) or {len(one) for one in columns.values()} != {
-        rows
-    }:
+    alike = all(len(one) == rows for one in columns.values())
+    if not alike or (stored, rest) != (np.dtype(spec.dtype), [len(spec.channels)]):
         raise FormatError(
             f"In {path}, the data of stream {spec.name!r} are {stored} of shape {(rows, *rest)}, where {spec.dtype} of "
             f"{len(spec.channels)} channels is expected, or columns differ in length.",
