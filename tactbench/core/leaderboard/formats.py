@@ -34,7 +34,7 @@ def latex(table: Table, view: View) -> str:
     return latex_of([*grids, *table.sections], wide=False)
 
 
-def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
+def rendered(table: Table, shape: str, view: View = WHOLE, width: int = terminal.WITHOUT_EDGE) -> bytes:
     """Return a leaderboard as the content of a file in the format `shape`, one of the values of `SUFFIXES`.
 
     Parameters

@@ -1,5 +1,6 @@
 """What stands together, in what order, in which columns."""
 
+import json
 import random
 
 import pytest
@@ -46,6 +47,10 @@ def test_the_best_stands_first_and_equal_scores_share_a_place(scores, more, foun
     for order in (rows, rows[::-1]):
         (block,) = build_table(order).blocks
         assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == found
+        for one, (place, _) in zip(json.loads(rendered(build_table(order), "json")), found, strict=True):
+            assert (one["shown"]["rank"], str(one["rank"] or "")) == (place, place.rstrip("="))
+            assert one["rank_tied"] == (place.endswith("=") if place else None)
+            assert not place or (one["rank_low"], one["rank_high"]) == ((1, 2) if place == "1=" else (one["rank"],) * 2)
 
 
 @pytest.mark.parametrize(("spread", "mark"), [((0.2,) * 6, ""), ((-0.2, 0.4, -0.1, 0.4, -0.2, 0.4), "*")])
