@@ -28,6 +28,7 @@ from tactbench.plugin.devices import (
     DriverSettings,
     EmulatedDevice,
     EmulatedDevices,
+    EmulatorSettings,
     GuardState,
     LocalGuard,
     largest_force_n,
@@ -35,7 +36,6 @@ from tactbench.plugin.devices import (
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 RAILS = ("joint-1", "joint-2", "joint-3")
 WAY_M, POINTS = 1e-3, 8
@@ -62,7 +62,8 @@ class Machine(faults.Pressed):
         own = {"motor": self.devices._devices["motor"], "force": self.devices._devices["force"]}
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
-            self.rails[name] = MotorEmulator(None, rng, FaulhaberOptions(**RAIL), faults=given.get(name, []))
+            self.rails[name] = MotorEmulator(EmulatorSettings(lambda at_s: {}, rng, RAIL))
+            self.rails[name].faults = given.get(name, [])
             own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())))
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock

@@ -137,12 +137,10 @@ class Pressed:
         self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
         self.sensed: Callable[[list[float], float], list[float]] = lambda wrench, at_s: wrench
         rng = np.random.default_rng(setting.seed)
-        self.motor = ListeningMotor(
-            self._load,
-            np.random.default_rng(setting.seed + 1),
-            build_options(setting.baud),
-            faults=faults.get("motor", []),
-        )
+        own = np.random.default_rng(setting.seed + 1)
+        self.motor = ListeningMotor(EmulatorSettings(lambda at_s: {}, own, {**STATED, "baud": setting.baud}))
+        self.motor.press_against(self._load)
+        self.motor.faults = faults.get("motor", [])
 
         def wrench(at_s: float) -> list[float]:
             self._places.append((at_s, self.position_m))
@@ -194,13 +192,6 @@ class Pressed:
         )
         force = force_driver(DriverSettings(self.devices.opener("force"), options=options["force"], clock=self.clock))
         return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance, kept=kept)
-
-
-def build_options(baud: int = 115200) -> Any:
-    """Return the options of the drive."""
-    from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-
-    return FaulhaberOptions(**STATED, baud=baud)
 
 
 @dataclass

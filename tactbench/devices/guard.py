@@ -27,14 +27,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
 
-from tactbench.core.errors import (
-    LinkClosed,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    RigError,
-    TactbenchError,
-)
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, RigError, TactbenchError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, fault_text
@@ -203,7 +196,7 @@ class LocalGuard:
                 ) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._refused, self._touched = 0, False
-        self._end_sequence = self._watch.sequence
+        self._end_sequence = self._watch.received
         # The samples of a homing may be those of a minute: to send them would take the time of a beat.
         self.force_blocks.clear()
         self.motor_blocks.clear()
@@ -348,7 +341,7 @@ class LocalGuard:
         if axis is self._press:
             self.motor_blocks += blocks
             if was_moving and not axis.moving:
-                self._end_sequence = self._watch.sequence
+                self._end_sequence = self._watch.received
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
             return Trigger.AXIS_FAULT, f"{name}: the controller reports {axis.state.problem}"
@@ -367,7 +360,7 @@ class LocalGuard:
             self._into_skin = False
             self._halt(*(axis for axis in self._axes.values() if axis.moving))
             return ""
-        if beat.force_sequence > self._watch.sequence:
+        if beat.force_sequence > self._watch.received:
             return f"force sample {beat.force_sequence} has not been received"
         travels, press = beat.command is CommandKind.TRAVEL, self._press
         if reason := self._travel_reason(beat) if travels else self._press_reason(beat):
@@ -638,7 +631,7 @@ class LocalGuard:
             target_m=math.nan if state is None else state.target,
             positions={name: axis.position for name, axis in self._axes.items()},
             force_n=watch.force_n,
-            force_sequence=watch.sequence,
+            force_sequence=watch.received,
             touched=self._touched,
             trigger=self.trigger,
             not_out=self._not_out,

@@ -308,15 +308,7 @@ class Positioner(Driver):
         self._moving, self._goal, self._nearest, self._retreats = True, target, math.inf, False
         self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
-    def see(
-        self,
-        t_ns: int,
-        position: float,
-        *,
-        idle: bool,
-        target: float | None = None,
-        problem: str = "",
-    ) -> None:
+    def see(self, t_ns: int, position: float, *, idle: bool, target: float | None = None, problem: str = "") -> None:
         """Register an answer: its time, the position, `idle` as the controller reports it, and other values.
 
         A move ends when the axis is idle at its target; an idle axis elsewhere has not begun to move. A halt ends when

@@ -145,10 +145,7 @@ def serve(
     physics = physics_of(file, registry)
     where = registry.rigs[file.rig].emulators
     emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control,
-        RealTimeDevices(emulators.devices) as emulated,
-    ):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control, RealTimeDevices(emulators.devices) as emulated:
         control.bind(("127.0.0.1", 0))
         control.settimeout(LISTEN_S)
         started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
@@ -163,7 +160,7 @@ def serve(
                 if request.get("begin"):
                     emulators.begin(emulated.clock() * 1e-9)
                     progress("The scene begins")
-                elif physics is not None:
+                else:
                     sensor, scene = registry.sensors[request["sensor"]], Scene.model_validate(request["scene"])
                     with physics.open(sensor, scene, seed=request["seed"]) as simulated:
                         emulators.prepare(simulated, sensor, scene, request["seed"])
@@ -195,9 +192,10 @@ class ScenePhysics(Rig):
     Parameters
     ----------
     rig
-        The simulated rig; None: it runs in the process of the emulated devices.
+        The simulated rig; None: it runs in the process of the emulated devices, or there are none.
     control
-        Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file.
+        Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file; empty: no such
+        process, and without a rig nothing is simulated.
     """
 
     def __init__(self, rig: Rig | None, control: str = "") -> None:
@@ -216,6 +214,10 @@ class ScenePhysics(Rig):
             with self._rig.open(sensor, scene, seed=seed) as simulated:
                 yield simulated
             return
+        if not self._control:
+            nothing: Any = SimpleNamespace(plan=(), assumptions={}, drawn={})
+            yield nothing
+            return
         request = {"sensor": sensor.name, "scene": scene.model_dump(mode="json"), "seed": seed}
         answer = self._request(request, PREPARE_S)
         plan = tuple(map(PlanEntry.model_validate, answer.pop("plan")))
@@ -224,7 +226,7 @@ class ScenePhysics(Rig):
 
     def begin(self) -> None:
         """Let the scene begin in the other process; raises the errors of :meth:`open`."""
-        if self._rig is None:
+        if self._control:
             self._request({"begin": True}, BEGIN_S)
 
     def _request(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
@@ -245,8 +247,8 @@ class ScenePhysics(Rig):
         return answer
 
 
-def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
-    """Return the simulation of scenes for a rig's emulated devices; None: the rig file has no emulated devices.
+def physics_of(file: RigFile, registry: Registry) -> ScenePhysics:
+    """Return the simulation of scenes for a rig's emulated devices, if it has any.
 
     Raises
     ------
@@ -254,7 +256,7 @@ def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
         If the rig under `physics` is not a simulation.
     """
     if not file.emulated:
-        return ScenePhysics(None, file.emulation.control) if file.emulation.control else None
+        return ScenePhysics(None, file.emulation.control)
     descriptor = registry.rigs[file.emulation.physics or registry.first_rig("simulated")]
     if not descriptor.simulated:
         raise UsageError(

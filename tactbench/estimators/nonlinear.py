@@ -86,7 +86,7 @@ class Neighbours(Wrapped):
         return self
 
 
-def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estimator:
+def neighbours(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
     """Return an estimator that predicts the vote, or the mean, of the `n_neighbors` nearest rows with equal weights.
 
     Fifteen neighbours (assumed): neighbours in feature space are mostly consecutive samples; at 100 Hz five of them
@@ -95,7 +95,7 @@ def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estim
     from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 
     make = KNeighborsClassifier if kind == "classification" else KNeighborsRegressor
-    return Neighbours(make(n_neighbors=n_neighbors, n_jobs=threads))
+    return Neighbours(make(n_jobs=threads, **params))
 
 
 class OfUnitSpread(Wrapped):
@@ -138,7 +138,7 @@ class EveryNth(Wrapped):
         return self
 
 
-def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Estimator:
+def support_vectors(*, kind: str, seed: int, threads: int, rows: int, **params: Any) -> Estimator:
     """Return libsvm's support vector machine (Cortes and Vapnik 1995) with a Gaussian kernel.
 
     Classes are compared in pairs; for numbers, the tube is 0.1 standard deviations of y wide. ``gamma="scale"`` is
@@ -146,11 +146,11 @@ def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: floa
     """
     from sklearn.svm import SVC, SVR
 
-    model = SVC(C=C, gamma=gamma) if kind == "classification" else OfUnitSpread(SVR(C=C, gamma=gamma, epsilon=0.1))
+    model = SVC(**params) if kind == "classification" else OfUnitSpread(SVR(epsilon=0.1, **params))
     return EveryNth(model, rows)
 
 
-def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Estimator:
+def perceptron(*, kind: str, seed: int, threads: int, hidden: int, **params: Any) -> Estimator:
     """Return a neural network with one hidden layer of `hidden` rectified units, trained by Adam (Kingma and Ba 2015).
 
     Training ends after ten epochs without a better score on a tenth of the training rows, drawn by the seed, or after
@@ -159,8 +159,5 @@ def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float,
     """
     from sklearn.neural_network import MLPClassifier, MLPRegressor
 
-    settings = {
-        "hidden_layer_sizes": (hidden,), "alpha": alpha, "max_iter": max_iter, "early_stopping": True,
-        "random_state": seed,
-    }  # fmt: skip
+    settings = {"hidden_layer_sizes": (hidden,), "early_stopping": True, "random_state": seed, **params}
     return MLPClassifier(**settings) if kind == "classification" else OfUnitSpread(MLPRegressor(**settings))

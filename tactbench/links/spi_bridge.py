@@ -60,25 +60,16 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 class FrameDecoder:
-    """Decoder of frames from pieces of received bytes.
-
-    Attributes
-    ----------
-    damaged
-        Number of stretches between two zero bytes that were not valid frames.
-    """
+    """Decoder of frames from pieces of received bytes."""
 
     def __init__(self) -> None:
-        self.damaged = 0
         self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes; count stretches that are not valid frames in `damaged`."""
+        """Return the frames that `data` completes; what is no valid frame between two zero bytes is dropped."""
         *ended, rest = (self._pending + data).split(b"\0")
         self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
-        found = [_frame_in(stuffed) for stuffed in ended if stuffed]
-        self.damaged += found.count(None)
-        return [frame for frame in found if frame is not None]
+        return [frame for stuffed in ended if (frame := _frame_in(stuffed)) is not None]
 
 
 def _frame_in(stuffed: bytes) -> Frame | None:

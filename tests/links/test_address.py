@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tactbench.links.address import KINDS, parse_address
 from tactbench.plugin import UsageError
@@ -56,16 +54,6 @@ def test_an_error_names_what_is_wrong_or_expected(text, named):
     with pytest.raises(UsageError) as raised:
         open_link(text)
     assert named in str(raised.value)
-
-
-@settings(max_examples=25)
-@given(st.text(max_size=40) | st.builds("{}://{}?{}".format, st.sampled_from([*KINDS]), st.text(), st.text()))
-def test_any_text_is_an_address_or_a_usage_error(text):
-    try:
-        kind, _, _ = parse_address(text)
-    except UsageError as error:
-        kind, hint = None, error.hint
-    assert kind in KINDS or hint
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.rigs.twin.effects.skin_mode import Mode, shaken, slip_s, swing
-from tactbench.rigs.twin.effects.stick_slip import STICK, Dragged, Drive, bristle, coefficient
-from tactbench.rigs.twin.partial_slip import share_of_force, sliding_stiffness, stick_ratio
+from tactbench.rigs.twin.contact.tangential import share_of_force, sliding_stiffness, stick_ratio
+from tactbench.rigs.twin.effects.stick_slip import (
+    STICK,
+    Dragged,
+    Drive,
+    Mode,
+    bristle,
+    coefficient,
+    shaken,
+    slip_s,
+    swing,
+)
 
 STATIC, KINETIC, LOAD_N, STIFFNESS, OMEGA = 0.8, 0.5, 2.0, 3.0, 2.0 * math.pi * 300.0
 

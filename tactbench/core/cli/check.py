@@ -9,7 +9,7 @@ import click
 
 from tactbench.core.cli.grid import print_fields, print_records
 from tactbench.core.cli.options import format_option
-from tactbench.core.conformance.check import CHECKS, KINDS, Mode
+from tactbench.core.conformance.check import CHECKS, KINDS
 from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
@@ -36,7 +36,7 @@ def command(
     opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     if listed:
-        checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds), "mode": one.mode,
+        checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds),
                    "why": one.why, "do": one.cure} for one in CHECKS]  # fmt: skip
         print_records(checks, shape, title="checks", columns=("check", "of", "why"))
         return
@@ -52,12 +52,9 @@ def command(
             raise
         subjects = []
         remark(error.message)
-    modes: list[Mode] = ["passive"]
-    if recording is not None:
-        modes.append("recording")
-        if not wrong and all(one.kind != "sensor" for one in subjects):
-            raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
-    reports = [run_checks(one, modes=modes, recording=recording, root=root) for one in subjects]
+    if recording is not None and not wrong and all(one.kind != "sensor" for one in subjects):
+        raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
+    reports = [run_checks(one, recording=recording, root=root) for one in subjects]
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
@@ -73,7 +70,7 @@ def _plain(report: CheckReport) -> dict[str, object]:
 
     return {
         "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level,
-        "kit": tactbench.__version__, "modes": list(report.modes), "checks": [one._asdict() for one in report.outcomes],
+        "kit": tactbench.__version__, "checks": [one._asdict() for one in report.outcomes],
     }  # fmt: skip
 
 

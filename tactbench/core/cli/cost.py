@@ -41,7 +41,7 @@ from tactbench.core.tables.text import json_text
     click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
                  help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
-    click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
+    click.option("--rounds", type=click.IntRange(min=1), default=5, metavar="N",
                  help="Number of timing rounds, for --twin without --task."),
     JOBS,
     RESULTS,
@@ -59,7 +59,6 @@ def command(
     if twin and task is None:
         if any(options_given.values()):
             raise UsageError("--twin without --task takes --sensor and --rounds only.", hint="Leave the others out.")
-
         _show_twin(sensors, out / "cost", shape, rounds)
         return
     if task is None or (len(sensors) != 1 and not twin):

@@ -25,7 +25,7 @@ _OPTIONS = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal 
 @click.argument("kind", type=click.Choice(KINDS))
 @click.argument("name")
 @click.option("--into", type=click.Path(path_type=Path, file_okay=False), default=Path(), metavar="DIR",
-              help="Folder of the package; created if missing. Default: the current folder.")  # fmt: skip
+              help="Folder of the package; created if missing.")  # fmt: skip
 def command(kind: str, name: str, into: Path) -> None:
     """Write an installable package with a plugin that already runs: a sensor, rig, task, estimator or effect.
 

@@ -46,7 +46,6 @@ from tactbench.core.tables.text import command_line, cut
                  help="Include recordings with more missing samples than their rig file allows."),
     SIMULATION,
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
-                 show_default=True,
                  help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
     JOBS,
     click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",

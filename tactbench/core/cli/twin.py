@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import asdict
 from typing import Any
 
 import click
@@ -32,7 +32,7 @@ def command() -> None:
 @command.command(name="explain")
 @click.option("--sensor", "sensor_name", required=True, metavar="NAME", help="Sensor.")
 @click.option("--task", "task_name", required=True, metavar="NAME", help="Task whose scenes are planned.")
-@click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
+@click.option("--rounds", type=click.IntRange(min=0), default=5, metavar="N",
               help="Number of recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
 @EFFECTS
 @format_option("table", "json", "csv")
@@ -86,11 +86,8 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
 
 def _effect(row: Explained) -> dict[str, Any]:
-    entry, cost_ms = row.entry, None if row.cost_s is None else round(1e3 * row.cost_s, 2)
-    return {
-        "effect": entry.effect, "included": entry.included, "asked": entry.asked, "reason": entry.reason,
-        "change": entry.change, "unit": entry.unit, "cost_ms": cost_ms, "remark": row.remark,
-    }  # fmt: skip
+    cost_ms = None if row.cost_s is None else round(1e3 * row.cost_s, 2)
+    return {**row.entry.model_dump(), "cost_ms": cost_ms, "remark": row.remark}
 
 
 @command.command(name="verify")
@@ -115,6 +112,5 @@ def verify(ctx: click.Context, shape: str) -> None:
 
 
 def _record(verdict: Verdict) -> dict[str, Any]:
-    numbers = {name: float(getattr(verdict, name)) for name in ("found", "expected", "bound")}
-    finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
-    return {"met": verdict.met, "what": verdict.name, **finite, "unit": verdict.unit, "source": verdict.source}
+    stated = asdict(verdict)
+    return {"met": verdict.met, "what": stated.pop("name"), **stated}

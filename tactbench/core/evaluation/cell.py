@@ -49,7 +49,6 @@ from tactbench.core.evaluation.splits import (
     SHUFFLED_WHOLE_STAMP,
     OwnSplit,
     over_rows,
-    used_rows,
 )
 from tactbench.core.evaluation.summaries import band_limit, clocked, with_windows
 from tactbench.core.plugins.interfaces import Estimator
@@ -177,7 +176,7 @@ def _result(
     tested = sets["test"]
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
-        _refuse(estimator.descriptor.name, metric, tested)
+        _refuse(estimator.descriptor.name, metric, score, tested)
     unit = replicates(made, data.unit, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
@@ -185,7 +184,9 @@ def _result(
     for other in METRICS.values():
         if other.kind == task.kind and other.vector == metric.vector and other is not metric:
             scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
-    remarks = _of_answers(data)
+    remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))] if task.answer_per == "frame" else []
+    if data.held_back:
+        remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
     beside: dict[str, Any] = {}
     held = truth = None
     if metric.kind == "regression":
@@ -258,12 +259,12 @@ def _joined(folds: Sequence[Answers]) -> Answers:
     return Answers(**{name: np.concatenate([getattr(one, name) for one in folds]) for name in names})
 
 
-def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
+def _refuse(estimator: str, metric: Metric, score: float, tested: Answers) -> None:
     """Raise for a score that is not a finite number: PluginContractError if answers are too large, else DataError."""
-    largest = float(np.abs(tested.y_pred).max())
-    if largest > LARGEST:
+    if metric.function is None and np.isinf(score):
         raise PluginContractError(
-            f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: the {metric.name} overflows.",
+            f"The estimator {estimator!r} answered with numbers up to {np.abs(tested.y_pred).max():.3g}: the "
+            f"{metric.name} overflows.",
             hint=f"Its predict(X) must return numbers below {LARGEST:g}, in the unit of the labels.",
         )
     why = "not a finite number" if metric.function else "undefined: all test labels are equal"
@@ -274,7 +275,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], list[str]]:
     """Return the recordings that a fold uses, and warnings of leaks."""
     recorded = data.recorded
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
-    used = used_rows(folds)
+    sets = [mask for one in folds for mask in (one.train, one.test, one.validation) if mask is not None]
+    used = np.logical_or.reduce(sets)
     took_part = [recorded.metas[place] for place in np.unique(recorded.recording[used & recorded.labelled]).tolist()]
     if data.split != "shuffled":
         stamps = (*data.stamps, *leak_stamps(recorded, folds))
@@ -284,21 +286,11 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], list[str]]:
     return took_part, stamped
 
 
-def _of_answers(data: TaskData) -> list[str]:
-    """Return remarks on answers to frames, for the report."""
-    if data.task.answer_per != "frame":
-        return []
-    remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]
-    if data.held_back:
-        remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
-    return remarks
-
-
 def _groups_alike(data: TaskData) -> Iterator[str]:
     """Yield a text on labels of the split's groups that differ only by case or spaces: probably the same group."""
     name = data.assignments[0].groups
-    tables = [table.groups[name] for table in data.data.tables if name in table.groups]
-    return alike(f"values of {name}", sorted({str(one) for table in tables for one in np.unique(table)}))
+    labels = np.unique(data.data.column(lambda table: table.groups.get(name, "")))
+    return alike(f"values of {name}", labels.tolist())
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:

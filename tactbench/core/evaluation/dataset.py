@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.channels import (
+    SlipReference,
     channel_on,
     channels_for,
     feature_streams,
@@ -21,8 +22,8 @@ from tactbench.core.evaluation.channels import (
     on_clock,
     read_channel,
     require_forward,
+    slip_reference,
 )
-from tactbench.core.evaluation.slip_reference import SlipReference, slip_reference
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
@@ -314,9 +315,8 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     if isinstance(task.target, SlipTarget):
         reference = slip_reference(recording, task.target, 0 if clock.t_ns is None else int(clock.t_ns[0]), counts)
     whole = np.asarray(~np.isnan(X).any(axis=1))
-    for name, column in columns.items():
-        if np.isnan(column).any():
-            counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
+    if not whole.all():
+        counts["rows left out because a channel has no sample"] += int((~whole).sum())
     row = np.arange(len(X), dtype=np.int64)
     time_s = (clock.t_ns - clock.t_ns[0]) * 1e-9 if clock.t_ns is not None else row.astype(np.float64)
     table = Table(

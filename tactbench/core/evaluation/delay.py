@@ -71,7 +71,8 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
     links: list[float | None] = []
     windows: list[float | None] = []
     for table in data.recorded.tables:
-        wait_s, row_s = _wait_s(table, features, rules), _row_s(table, features, rules)
+        wait_s, rate_hz = _wait_s(table, features, rules), _used(table.meta, features)[0].rate_hz
+        row_s = _step_s(table) or (rules.every / rate_hz if rate_hz else None)
         link = table.meta.sensor.link_delay
         links.append(None if link is None else link.to("s"))
         sampling.append(max(wait_s, slip_target(task).hop_s) if frames and wait_s else wait_s)
@@ -107,12 +108,6 @@ def _step_s(table: Table) -> float:
     timed = table.meta.clock != "none" and len(table.time_s) > 1
     step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
     return step_s if step_s <= SLOWEST_S else 0.0
-
-
-def _row_s(table: Table, features: Sequence[str], rules: ProtocolSpec) -> float | None:
-    """Return the interval [s] between rows by the clock, or else by the stated rate; None if both are unknown."""
-    rate_hz = _used(table.meta, features)[0].rate_hz
-    return _step_s(table) or (rules.every / rate_hz if rate_hz else None)
 
 
 def answer_delay_ms(parts_ms: Mapping[str, float], looks_at: str) -> float | None:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import Dataset, at_rows
 from tactbench.core.evaluation.delay import Clock
 from tactbench.core.evaluation.event_answers import EventRules, Scored
@@ -45,7 +45,7 @@ def builder(
     """Return a function that makes a new estimator from parameters; for a vector target, one for each component.
 
     The estimator's code is imported, and one estimator is made on trial. Raises UsageError if the estimator is not for
-    this kind of task, or has no parameter of a given name.
+    this kind of task.
     """
     if task.kind not in estimator.kinds:
         raise UsageError(
@@ -53,9 +53,6 @@ def builder(
             f"kind {task.kind}.",
             hint="Choose another estimator; `tactbench list estimators` shows the kinds of tasks of each.",
         )
-    for name in params:
-        if name not in estimator.params:
-            raise UnknownNameError(f"parameter of estimator {estimator.name!r}", name, estimator.params)
     make = load_object(estimator.where)  # imports happen here, before any clock is read
 
     def build(chosen: Mapping[str, Any]) -> Estimator:

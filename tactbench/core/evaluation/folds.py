@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, wrong
 from tactbench.core.evaluation.dataset import Dataset, Mask, load_dataset, thinned
-from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
+from tactbench.core.evaluation.protocols import DEPLOYABLE, ProtocolSpec, protocol_called, shots
 from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
 from tactbench.core.evaluation.splits import (
     SPLITS_WITHOUT_GROUPS,
@@ -20,6 +20,7 @@ from tactbench.core.evaluation.splits import (
     OwnSplit,
     choose_split,
     make_splits,
+    require_first_rows,
     with_validation,
 )
 from tactbench.core.evaluation.summaries import framed, is_summarised, summarised, with_windows
@@ -146,20 +147,23 @@ def load_task(
     Raises
     ------
     NotApplicable
-        If the estimator uses the time and a recording has no clock. If the protocol thins samples or states a mean
-        filter, and the task has answers to frames or summaries in place of samples.
+        If the estimator uses the time and a recording has no clock. If the protocol thins or drops single samples, or
+        states a mean filter, and the task has answers to frames or summaries in place of samples.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
     rules = protocol_called(protocol)
     estimator = with_windows(estimator, task, rules)
     frames = task.answer_per == "frame"
-    if (rules.every > 1 or rules.k is not None) and (frames or is_summarised(task, rules)):
+    single = rules.every > 1 or rules.k is not None or rules.three_sigma or rules.first_row_only
+    if single and (frames or is_summarised(task, rules)):
         raise NotApplicable(
             f"Protocol {protocol!r} is for answers to single samples; {task.name} has answers to summaries of samples.",
-            hint=f"Use protocol `{without_options(protocol)}`.",
+            hint=f"Use protocol `{DEPLOYABLE.name}`.",
         )
     recorded = thinned(recorded, rules.every)
     name = split.name if isinstance(split, OwnSplit) else choose_split(task, rules, recorded, split)
+    if rules.first_row_only and not isinstance(split, OwnSplit):
+        require_first_rows(task, recorded, name)
     if isinstance(split, OwnSplit) and (rules.roles_only or rules.first_row_only):
         raise NotApplicable(f"Protocol {protocol!r} has its own split, not {name}.", hint="Use protocol `deployable`.")
     if rules.tare:

@@ -22,6 +22,8 @@ MOST_SHARED = 0.05
 """Largest share of a fold's test rows that may equal training rows; two presses on a noisy sensor share no row."""
 AT_REST = 4
 """Largest number of distinct test rows that may equal training rows, as those of an untouched sensor do."""
+ODD = np.uint64(0x9E3779B97F4A7C15)
+"""Odd factor of hashes, 2^64 over the golden ratio (Knuth, The art of computer programming, volume 3, section 6.4)."""
 _Hashes = npt.NDArray[np.uint64]
 
 
@@ -112,5 +114,5 @@ def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
 
 
 def _factors(count: int) -> _Hashes:
-    """Return `count` random odd factors for hashes, the same in every call."""
-    return np.random.default_rng(16).integers(0, 2**63, count, dtype=np.uint64) * np.uint64(2) + np.uint64(1)
+    """Return `count` odd factors for hashes: the powers of :data:`ODD`, modulo 2^64."""
+    return np.cumprod(np.full(count, ODD))

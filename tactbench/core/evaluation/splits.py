@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -97,13 +97,6 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requeste
     Raises UsageError if the recordings cannot be split as requested, NotApplicable if the protocol does not allow the
     requested split or no split of the task is possible.
     """
-    split = _split_for(task, protocol, data, requested)
-    if protocol.first_row_only:
-        _require_first_rows(task, data, split)
-    return split
-
-
-def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
     if protocol.roles_only:
         if requested not in (None, "roles"):
             raise NotApplicable(
@@ -140,7 +133,7 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
     )
 
 
-def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
+def require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
     """Raise NotApplicable if a protocol on the first rows of recordings cannot test them for leaks."""
     changing = next((one.meta.name for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
     alone = all(len(table.row) == 1 for table in data.tables)
@@ -169,12 +162,6 @@ def _can(name: str, data: Dataset) -> bool:
     # Rows of no known group could be related to either side.
     known = all(name in data.tables[place].groups for place in _open_to_folds(data))
     return known and len(_sizes(data, _open_rows(data), name)) >= 2
-
-
-def used_rows(assignments: Sequence[Assignment]) -> Mask:
-    """Return a mask of the rows that are in the training, validation or test set of at least one fold."""
-    sets = [mask for one in assignments for mask in (one.train, one.test, one.validation) if mask is not None]
-    return np.asarray(np.logical_or.reduce(sets))
 
 
 def training_sessions(data: Dataset) -> list[str]:

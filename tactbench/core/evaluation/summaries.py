@@ -44,12 +44,6 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
     """
     if not is_summarised(task, rules):
         return data
-    if rules.three_sigma or rules.discard_samples:
-        raise NotApplicable(
-            f"Protocol {rules.name!r} drops single samples, but task {task.name!r} summarises whole recordings, which "
-            "need consecutive samples.",
-            hint="Use protocol `deployable`.",
-        )
     compute = recording_features(task, rules)
     rows = [compute(table) for table in data.tables]
     tables = tuple(_one_row(table, row) for table, row in zip(data.tables, rows, strict=True))
@@ -185,11 +179,6 @@ def _one_row(table: Table, features: Features) -> Table:
 
 def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
     """Return a data set with one row for each frame, with the features that `estimator` uses."""
-    if rules.three_sigma or rules.discard_samples or rules.first_row_only:
-        raise NotApplicable(
-            f"Protocol {rules.name!r} drops single samples, but task {task.name!r} needs consecutive samples.",
-            hint="Use protocol `deployable`.",
-        )
     counts = Counter(data.counts)
     compute = frame_features(task, rules, estimator)
     tables, names = zip(*(_framed(table, task, rules, compute, counts) for table in data.tables), strict=True)

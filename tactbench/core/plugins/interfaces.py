@@ -173,6 +173,10 @@ class RigCheck:
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
     """Reasons for refusing the rig file, each with the next step; empty: the file is valid."""
+    file: RigFile | None = None
+    """The rig file, with the values that the rig's settings add to its axes; None: it has no axes."""
+    travel_ceiling_n: float = 0.0
+    """Norm of the force at which an axis that does not press halts."""
 
 
 @dataclass(frozen=True)
@@ -194,12 +198,6 @@ class CostPoint:
     unit: str
     floor: float
     """Standard deviation of the observable's own noise; infinity for an observable without noise."""
-    default: bool
-    """True if this is the default setting."""
-    rung: str
-    """Name of the solver setting (rung) that this point shows; empty: it shows none."""
-    settings: Mapping[str, Scalar]
-    """Parameters of this setting by name."""
 
 
 class CostJob(NamedTuple):
@@ -208,8 +206,6 @@ class CostJob(NamedTuple):
     label: str
     run: Callable[[], list[CostPoint]]
     """Function that makes the measurement; a TactbenchError raised in it becomes a row."""
-    rung: str = ""
-    """Name of the solver setting (rung) of the measured points."""
 
 
 class CostStudy(NamedTuple):

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tactbench.core.errors import FormatError, UnwritableError
-from tactbench.core.files import hdf5_image, writable
+from tactbench.core.files import hdf5_image, replace_file, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
 from tactbench.core.recording.format import Annotations, Array, Blocks, Columns
-from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.reader import content_digest
 from tactbench.core.samples import IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -61,36 +59,23 @@ def store(
         If `target` exists and `replace` is False, the file read back differs from the data, or the disk refuses to
         write; `target` stays unchanged.
     """
-    try:
-        with writable(target):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            meta, times = on_host_clock(meta, blocks)
-            flagged = {stream for stream, columns in blocks if "quality" in columns}
-            image = hdf5_image(lambda file: _fill(file, meta, _completed(blocks, times, flagged), annotations))
-            with aside.open("wb") as file:
-                file.write(image)
-                file.flush()
-                if sync:
-                    os.fsync(file.fileno())
-            try:
-                with open_recording(aside) as written:
-                    written.verify()
-            except FormatError as error:
-                raise UnwritableError(
-                    f"The data of {target}, read back, differ from the data written.", hint="Check the disk."
-                ) from error
-            if not replace:
-                require_free(target)
-            aside.replace(target)
-            if sync and os.name != "nt":  # folders cannot be opened there
-                folder = os.open(target.parent, os.O_RDONLY)
-                try:
-                    os.fsync(folder)
-                finally:
-                    os.close(folder)
-    finally:
-        with suppress(OSError):
-            aside.unlink(missing_ok=True)
+
+    def check(written: Path) -> None:
+        try:
+            content_digest(written)
+        except FormatError as error:
+            raise UnwritableError(
+                f"The data of {target}, read back, differ from the data written.", hint="Check the disk."
+            ) from error
+        if not replace:
+            require_free(target)
+
+    with writable(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        meta, times = on_host_clock(meta, blocks)
+        flagged = {stream for stream, columns in blocks if "quality" in columns}
+        image = hdf5_image(lambda file: _fill(file, meta, _completed(blocks, times, flagged), annotations))
+        replace_file(target, image, aside=aside, check=check, sync=sync)
     return meta
 
 

@@ -36,19 +36,16 @@ class RecordingWriter:
         Path of the finished recording.
     meta
         Description of the recording; :meth:`revise` changes it until the end.
-    replace
-        True: an existing file is replaced, but only when the new recording is complete.
 
     Raises
     ------
     RecordingError
-        If the file exists and `replace` is False, or the disk refuses to write.
+        If the file exists, or the disk refuses to write.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta) -> None:
         self.path = path
         self.meta = meta
-        self._replace = replace
         self._specs = layout.specs_by_name(meta)
         self._complete = False
         self._optional: dict[str, tuple[bool, bool]] = {}
@@ -56,8 +53,7 @@ class RecordingWriter:
         self._partial: Partial
 
     def __enter__(self) -> RecordingWriter:
-        if not self._replace:
-            image.require_free(self.path)
+        image.require_free(self.path)
         with writable(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._partial = Partial(self.path, layout.meta_text(self.meta))
@@ -93,7 +89,7 @@ class RecordingWriter:
         """
         journal, aside = self._partial, layout.completing_path(self._partial.path)
         blocks = JournalBlocks(journal.path, None, journal.rows)
-        self.meta = image.store(self.path, self.meta, blocks, {}, aside=aside, replace=self._replace, sync=self._unique)
+        self.meta = image.store(self.path, self.meta, blocks, {}, aside=aside, sync=self._unique)
         self._complete = True
 
     def _leave(self, error: BaseException | None) -> None:
@@ -177,8 +173,6 @@ def write_recording(
     """
     specs = layout.specs_by_name(meta)
     stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
-    if not replace:
-        image.require_free(path)
     aside = layout.completing_path(path)
     image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
 

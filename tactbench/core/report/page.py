@@ -51,10 +51,12 @@ def answers_section(results: Results) -> Section:
 
 
 def leaderboards_section(results: Results) -> Section:
-    """Return the section of leaderboards, with the reasons of failed and skipped cells."""
+    """Return the section of leaderboards, with the reasons of failed and skipped cells, and of tables on events."""
     view = View(columns=(*DEFAULT, REASON))
-    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in results.leaderboard.blocks)
-    return Section(paragraphs=("A number leads to the details of its cell.",), tables=tables)
+    tables = [replace(grid(block, view), numeric=NUMERIC) for block in results.leaderboard.blocks]
+    tables += results.leaderboard.sections
+    return Section(paragraphs=("A number leads to the details of its cell.",),
+                   tables=tuple(table.compact() for table in tables))  # fmt: skip
 
 
 def published_section(results: Results) -> Section:
@@ -67,11 +69,6 @@ def figures_section(results: Results) -> Section:
     """Return the section of figures."""
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",)
     return Section(paragraphs=paragraphs * bool(results.drawn), pictures=results.drawn, missing=results.undrawn)
-
-
-def compared_section(results: Results) -> Section:
-    """Return the section of tables on events and leakage probes."""
-    return Section(tables=tuple(table.compact() for table in results.leaderboard.sections))
 
 
 def costs_section(results: Results) -> Section:
@@ -129,7 +126,6 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("leaderboards", "Leaderboard", leaderboards_section),
     ("reproduction", "Published numbers", published_section),
     ("figures", "Figures", figures_section),
-    ("compared", "Events and probes", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("assumptions", "What simulated scores rest on", assumptions_section),
     ("sensors", "Sensors (the paper's Table I)", sensors_section),

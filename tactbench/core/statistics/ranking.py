@@ -81,8 +81,7 @@ def _clearly(
     bound = wide[np.minimum.outer(which, which)] * np.maximum(variance, 0.0)
     ahead = np.subtract.outer(mean, mean)  # only cells before it can be better
     clear = np.tril(np.subtract.outer(error, error) > 0) & (ahead > 0) & (ahead**2 > bound)
-    if same > 0:
-        clear &= ~(ahead <= near_to) | (ahead + np.sqrt(bound) > near_to)
+    clear &= ~(ahead <= near_to) | (ahead + np.sqrt(bound) > near_to)
     places = np.ones(n, dtype=np.int64)
     first = 0  # of those that share the place of the cell before
     for place in range(1, n):

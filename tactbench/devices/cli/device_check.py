@@ -13,7 +13,6 @@ from tactbench.core.plugins.registry import Registry
 from tactbench.core.recording.clock_fit import fit, wrong_rate
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-from tactbench.devices.driver import Driver
 from tactbench.devices.rig_devices import descriptor_of, open_driver
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.byte_link import ByteLink
@@ -67,33 +66,26 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
 
 
 def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: float, clock: Clock) -> None:
-    descriptor = descriptor_of(registry, check.name, entry)
+    descriptor, blocks = descriptor_of(registry, check.name, entry), list[Block]()
     with open_driver(descriptor, entry, clock) as driver:
         try:
             check.identity = dict(driver.identify())
             if getattr(descriptor, "kind", "") == "motor":
                 check.remarks.append("a motor: not started")
                 return
-            _read(check, driver, seconds, clock)
+            driver.start()
+            order = {stream.name: SequenceCheck() for stream in driver.streams}
+            until_ns = clock() + round(seconds * 1e9)
+            while (left_s := (until_ns - clock()) * 1e-9) > 0:
+                blocks += filter(None, (order[block.stream](block) for block in driver.read(min(READ_S, left_s))))
+            driver.stop()
         finally:
             check.counts = {name: number for name, number in driver.counts.items() if number}
-
-
-def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
-    driver.start()
-    order = {stream.name: SequenceCheck() for stream in driver.streams}
-    blocks: list[Block] = []
-    until_ns = clock() + round(seconds * 1e9)
-    try:
-        while (left_s := (until_ns - clock()) * 1e-9) > 0:
-            blocks += filter(None, (order[block.stream](block) for block in driver.read(min(READ_S, left_s))))
-    finally:
-        driver.stop()
-    for name, stream in joined("driver.read", driver.streams, blocks).items():
-        if len(stream.data):
-            _judge(check, stream, order[name])
-        else:
-            check.problems.append(f"No data of stream {name} came within {seconds:g} s. {ByteLink.silence_hint}")
+        for name, stream in joined("driver.read", driver.streams, blocks).items():
+            if len(stream.data):
+                _judge(check, stream, order[name])
+            else:
+                check.problems.append(f"No data of stream {name} came within {seconds:g} s. {ByteLink.silence_hint}")
 
 
 def _judge(check: DeviceCheck, stream: StreamData, order: SequenceCheck) -> None:

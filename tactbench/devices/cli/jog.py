@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -47,9 +46,6 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
         known = ", ".join(file.devices) if file and file.force else "none with a force sensor"
         raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Axes in --rig-file: {known}.")
 
-    def ask(text: str) -> str:
-        return str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True))
-
     clock: Clock = time.monotonic_ns
     with ExitStack() as stack:
         links: dict[str, Any] = {}
@@ -63,11 +59,10 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
         axis = drivers[name]
         if not isinstance(axis, Positioner):
             raise UsageError(f"The device {name} is not an axis.", hint="Give an axis of the rig after --jog.")
-        move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n, ask, remark)
+        move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n)
 
 
-def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float,
-                  ask: Callable[[str], str], say: Callable[[str], None]) -> None:  # fmt: skip
+def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float) -> None:
     """Take the force's zero, home the axis if needed, and move it by the operator's answers until an empty answer.
 
     The axis halts if the norm of the force reaches `ceiling_n`, or if the force is not known; after that only a step
@@ -105,7 +100,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     def answer_to(text: str) -> str:
         """Return the answer to a prompt; the force samples received while it was shown are dropped."""
         nonlocal watch
-        answer = ask(text).strip()
+        answer = str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True)).strip()
         force.stop()
         force.start()
         watch = ForceWatch(stream)
@@ -126,7 +121,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
                 halted = wrong
         back = -way
         if halted:
-            say(f"The {name} was halted: {halted}")
+            remark(f"The {name} was halted: {halted}")
 
     try:
         if not (axis.homed or axis.find_home()):
@@ -148,9 +143,9 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
                     raise UsageError(f"A step of {answer} mm is longer than the permitted {1e3 * LONGEST_M:g} mm.")
                 move(step_m)
             except ValueError:
-                say(f"{answer!r} is neither + nor - nor a number of mm.")
+                remark(f"{answer!r} is neither + nor - nor a number of mm.")
             except TactbenchError as error:
-                say(str(error))
+                remark(str(error))
     finally:
         if axis.moving:
             axis.halt()

@@ -7,13 +7,16 @@ import math
 import re
 import struct
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import (
@@ -27,7 +30,7 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, FloatArray, Quality, StreamData
+from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
@@ -44,7 +47,7 @@ WRAPS, BEFORE_WRAP = (2**8, 2**16, 2**32), 10  # counts at which counters wrap; 
 WRAP_ROWS = 300  # rows that are read, so that any counter of 8 bits wraps
 CLOCK_WRAPS_S = (2**16 * 1e-3, 2**32 * 1e-6)  # wraps of 16 bits in milliseconds, and of 32 in microseconds
 CLOCK_SHARE, CLOCK_STEP_S = 0.05, 0.5  # largest difference in rate of a device's clock, and its largest step
-STEP, LAG_ROWS, LAG_S = (0.25, 0.75), 3, 0.02  # levels of a step in shares of the range; its largest delay
+LAG_ROWS, LAG_S = 3, 0.02  # largest delay of a step
 SLEEP_S, TRIES = 0.02, 8  # wall time of `read(0)` that is a sleep if a processor was less busy; the quickest of 8 reads
 MOST_STILL = 1000  # most reads at one moment, of a device that sends many samples at once
 LEVELS, MOVING_HZ, STALE = 8, 997.3, 0.1  # levels and frequency of readings; share of equal rows by chance
@@ -263,31 +266,66 @@ def _is_motor(subject: Subject) -> bool:
 
 @check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
-    """Swapped channels or bytes, a lost sign or a wrong unit (gram-force) give plausible but wrong readings.
+    """Swapped channels or bytes, a lost sign, a wrong unit or a hidden filter give plausible but wrong readings.
 
-    Decode into the order and units of the stream's channels; the emulator must encode the readings of its senses.
+    Decode into the order and units of the stream's channels; the emulator must encode the readings of its senses. State
+    the delay of a filter in `link_delay`; return no row before the device's first sample, or mark it as MISSING; keep
+    the rows of a block in the order of their time.
     """
     if _is_motor(subject):
         skip("the position of a motor is set by its rig, not by a test reading")
-    place, sensed = 1, dict[str, float]()
-    with emulated(subject, senses=lambda t_s: sensed) as opened:
-        every = opened.channels()
-        while place == 1 or place < len(every):
-            levels = [number // place % LEVELS / (LEVELS - 1) for number in range(len(every))]
-            meant = {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
-            sensed |= {name: value for name, (value, _) in meant.items()}
-            opened.read(WAIT_S)
-            for name, stream in opened.read().items():
-                for column, channel in enumerate(stream.spec.channels):
-                    value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
-                    expected, near = meant[channel.name]
-                    if abs(value - expected) <= near:
-                        continue
-                    others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
-                    guess = f", which is the reading of {others[0]}" if others else likely(value / expected)
-                    text = f"read {value:.4g}, expected {expected:.4g} {channel.unit}{guess}"
-                    fail(f"driver.read: {name}.{channel.name}", text)
-            place *= LEVELS
+    with emulated(subject, started=False) as opened:
+        every, row_s = opened.channels(), max(0.01, 1 / opened.slowest_hz)
+    steps_s, batches, stated = list[float](), Counter[str](), getattr(subject.spec, "link_delay", None)
+
+    @cache
+    def meant(turn: int) -> dict[str, tuple[float, float]]:
+        """Return a reading and its tolerance for each channel; any two channels differ in a turn."""
+        levels = [(number // LEVELS**turn + 3 * turn) % LEVELS / (LEVELS - 1) for number in range(len(every))]
+        return {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
+
+    def senses(t_s: float) -> dict[str, float]:
+        return {name: value for name, (value, _) in meant(sum(t_s >= step_s for step_s in steps_s)).items()}
+
+    with emulated(subject, senses=senses) as opened:
+        for turn in range(max(3, math.ceil(math.log(len(every), LEVELS)))):
+            if turn:
+                steps_s.append(1e-9 * opened.clock() + 4 * row_s)
+                opened.wait(8 * row_s)  # the step lies in the middle of a block
+            blocks = opened.blocks(READ_S + 2 * LAG_ROWS * row_s)
+            for block in () if turn else blocks:
+                batches[block.stream] = max(batches[block.stream], len(block.data))
+            for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
+                where, rows_s = f"driver.read: {name}", (LAG_ROWS + batches[name]) / (stream.spec.rate_hz or 1 / row_s)
+                _steady(where, stream, meant(turn))
+                if not turn:
+                    if not _as_meant(stream, meant(0))[0]:
+                        fail(where, "the first row is not as sensed: was it made before the first sample?")
+                    continue
+                since_s = (0.0 if stream.t_ns is None else 1e-9 * stream.t_ns) - steps_s[-1]
+                if (~_as_meant(stream, meant(turn - 1)) & (since_s < -row_s)).any():
+                    fail(where, "rows of one block are not in order of time")
+                late_s = float(np.where(_as_meant(stream, meant(turn)), 0.0, since_s).max())
+                if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
+                    fail(where, f"a step is {late_s:.2g} s late: state the delay of a filter in link_delay")
+
+
+def _steady(where: str, stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> None:
+    """Fail unless the second half of a stream has the meant readings."""
+    for column, channel in enumerate(stream.spec.channels):
+        value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
+        expected, near = meant[channel.name]
+        if not abs(value - expected) <= near:
+            others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
+            guess = f", which is the reading of {others[0]}" if others else likely(value / expected)
+            fail(f"{where}.{channel.name}", f"read {value:.4g}, expected {expected:.4g} {channel.unit}{guess}")
+
+
+def _as_meant(stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> npt.NDArray[np.bool_]:
+    """Return an (n,) array that is true for rows of which at least half of the finite readings are as meant."""
+    expected, near = np.transpose([meant[one.name] for one in stream.spec.channels])
+    off = np.abs(good(stream) - expected)
+    return np.asarray((off <= near).sum(axis=1) >= 0.5 * np.isfinite(off).sum(axis=1))
 
 
 @check("sensor", "device", needs="driver-reads")
@@ -427,55 +465,6 @@ def driver_waits_and_stops(subject: Subject) -> None:
         own = getattr(type(opened.driver), "quiet", None)
         if (quiet if own is None else own is not RowDriver.quiet) and math.isfinite(opened.due_s):
             fail("driver.stop", "the device still sends after stop()")
-
-
-@check("sensor", "device", needs="driver-reads-what-is-sensed")
-def driver_follows_a_step(subject: Subject) -> None:
-    """A filter that is not stated makes every reading late, and rows before the first complete sample read zero.
-
-    State the delay of a filter in `link_delay`; return no row before the device's first sample, or mark it as MISSING;
-    keep the rows of a block in the order of their time.
-    """
-    steps_s = list[float]()
-
-    def senses(t_s: float) -> dict[str, float]:
-        return {one.name: _reading(one, STEP[sum(t_s >= step_s for step_s in steps_s) % 2])[0] for one in every}
-
-    with emulated(subject, started=False) as opened:
-        every, slowest = opened.channels(), opened.slowest_hz
-    row_s = max(0.01, 1 / slowest)
-    with emulated(subject, senses=senses) as opened:
-        steps_s.append(1e-9 * opened.clock() + READ_S)
-        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / slowest)
-        steps_s.append(1e-9 * opened.clock() + 4 * row_s)
-        opened.wait(8 * row_s)  # this step lies in the middle of a block
-        after = opened.blocks(READ_S)
-    stated, streams = getattr(subject.spec, "link_delay", None), opened.driver.streams
-    late = joined("driver.read", streams, after)
-    for name, stream in joined("driver.read", streams, blocks).items():
-        found, times = _shares(stream)
-        before = np.flatnonzero(found < STEP[1])
-        if len(before) in (0, len(found)):  # a stream that gives no steady level
-            continue
-        if abs(found[0]) > STEP[0]:
-            fail(f"driver.read: {name}", "the first row is not as sensed: was it made before the first sample?")
-        late_s = float(times[min(int(before[-1]) + 1, len(found) - 1)]) - steps_s[0]
-        batch = max(len(one.data) for one in blocks if one.stream == name)
-        if late_s > (LAG_ROWS + batch) * np.ptp(times) / len(found) + LAG_S + (
-            0.0 if stated is None else stated.to("s")
-        ):
-            fail(f"driver.read: {name}", f"a step is {late_s:.2g} s late: state the delay of a filter in link_delay")
-        if (np.diff(_shares(late[name])[0]) > STEP[0]).any():
-            fail(f"driver.read: {name}", "rows of one block are not in order of time")
-
-
-def _shares(stream: StreamData) -> tuple[FloatArray, FloatArray]:
-    """Return the finite readings as (n,) shares of a step, 0 its lower and 1 its upper level, and (n,) times [s]."""
-    low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
-    found = np.asarray(((good(stream) - low) / (high - low)).mean(axis=1))
-    whole = np.isfinite(found) & (stream.t_ns is not None)
-    times = np.zeros(len(found)) if stream.t_ns is None else 1e-9 * stream.t_ns
-    return found[whole], times[whole]
 
 
 @check("sensor", "device", needs="driver-reads")

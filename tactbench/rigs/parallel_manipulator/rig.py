@@ -166,7 +166,7 @@ class ParallelManipulator(Rig):
     operator
         Access to the person who mounts the caps; not needed if all devices are emulated.
     physics
-        Simulation of the scenes for emulated devices; None: no device is emulated.
+        Simulation of the scenes for emulated devices.
 
     Raises
     ------
@@ -174,7 +174,7 @@ class ParallelManipulator(Rig):
         If the settings lack a value or contradict each other. :func:`build` refuses the same files as `doctor`.
     """
 
-    def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
+    def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics) -> None:
         self._file, self._operator, self._physics, self._registry = file, operator, physics, load_registry()
         self._session: Session | None = None
         limited, self.settings = with_limits(file, self._registry)
@@ -206,14 +206,12 @@ class ParallelManipulator(Rig):
         xy_m = self._place_m(scene)
         try:
             with ExitStack() as stack:
-                simulated: Acquisition | None = None
-                if self._physics is not None:
-                    simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+                simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
                 if self._session is None:
                     self._session = session = Session(file if file.emulated else self._file, self._registry)
                     # For a program that forgets this object, or ends.
                     self._finish = finalize(self, session.close)
-                if self._session.emulators is not None and simulated is not None:
+                if self._session.emulators is not None:
                     self._session.emulators.prepare(simulated, sensor, scene, seed)
                 yield self._pressing(stack, self._session, sensor, scene, simulated, xy_m)
         except BaseException:
@@ -240,7 +238,7 @@ class ParallelManipulator(Rig):
         session: Session,
         sensor: SensorDescriptor,
         scene: Scene,
-        simulated: Acquisition | None,
+        simulated: Acquisition,
         xy_m: tuple[float, float],
     ) -> PressAcquisition:
         """Return the scene's recording, ready to begin; `stack` closes the scene's own devices."""
@@ -259,22 +257,13 @@ class ParallelManipulator(Rig):
         identity = {**session.identity, sensor.name: driver.identify()}
         force, limits = session.measured_limits()
         press = Press(settings.press_plan(facts.resolution, guard.force_stream), _course(scene))
-        control: Control | None = None
-
-        def carry(until_ns: int) -> None:
-            if control is not None:
-                control.carry(until_ns)
-
-        reading = stack.enter_context(
-            Reading({sensor.name: driver}, clock=clock, advance=None if emulators is None else carry)
-        )
-
-        def received() -> int:
-            return sum(one.received for one in reading.stream_counts.values())
-
+        control: Control  # made below: it counts the rows of the reading that it advances
+        advance = None if emulators is None else lambda until_ns: control.carry(until_ns)
+        reading = stack.enter_context(Reading({sensor.name: driver}, clock=clock, advance=advance))
         stack.callback(_disarm, session)
         control = Control(
-            guard, limits, guard.arm(limits), press, received, clock,
+            guard, limits, guard.arm(limits), press,
+            lambda: sum(one.received for one in reading.stream_counts.values()), clock,
             period_s=1 / settings.force_loop.rate_hz, stale_s=1e-3 * settings.press.stale_ms,
         )  # fmt: skip
         stack.callback(control.stop)
@@ -282,7 +271,7 @@ class ParallelManipulator(Rig):
             control.start()
         blocks = reading.blocks(math.inf, lambda: press.over)  # a silent sensor yields no block
         events = _find_surface(control, blocks)
-        about: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
+        about: dict[str, Scalar] = dict(simulated.drawn)
         about |= {f"{name} {key}": value for name, values in identity.items() for key, value in values.items()}
         about |= {
             **force.about(),
@@ -297,8 +286,8 @@ class ParallelManipulator(Rig):
         found = PressAcquisition(
             streams=driver.streams,
             reference=(*force.streams, guard.motor_stream),
-            plan=() if simulated is None else simulated.plan,
-            assumptions={} if simulated is None else simulated.assumptions,
+            plan=simulated.plan,
+            assumptions=simulated.assumptions,
             about=about,
             force=force,
             control=control,
@@ -311,8 +300,7 @@ class ParallelManipulator(Rig):
         )
         if emulators is not None:
             emulators.begin(1e-9 * found.begin_ns)
-        if self._physics is not None:
-            self._physics.begin()
+        self._physics.begin()
         press.begin(1e-9 * found.begin_ns)
         return found
 

@@ -66,7 +66,7 @@ def check(file: RigFile) -> RigCheck:
         CheckTable("axes", ("axis", "stands", "largest force", "by", "units that are ASSUMED"), tuple(axes)),
         CheckTable("largest forces, and the force loop", ("what", "value"), tuple(forces)),
     )
-    return RigCheck(tables, tuple(problems))
+    return RigCheck(tables, tuple(problems), file, settings.limits.travel_ceiling_n)
 
 
 def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
@@ -110,7 +110,6 @@ def _too_strong(what: str, force_n: float, settings: RigSettings) -> list[str]:
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     force_n: float | None = options.largest_force_n
-    step_m, corridor_m = settings.force_loop.step_m, options.corridor_m
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]
     if force_n is None:
@@ -121,11 +120,6 @@ def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     skin, away = (1, "negative") if name == MOTOR else (-1, "positive")
     if options.homes_towards() == skin:
         problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s {away}.")
-    if name == MOTOR and corridor_m is not None and corridor_m > step_m:
-        problems.append(
-            f"The motor's moves end within {1e6 * corridor_m:g} um, and the largest increment is {1e6 * step_m:g} um. "
-            "Lower corridor_m, or raise the loop's speed."
-        )
     return problems
 
 

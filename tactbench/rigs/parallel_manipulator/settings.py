@@ -183,13 +183,14 @@ class Heights(Options):
 
 
 class Places(Options):
-    """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets."""
+    """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets.
+
+    The manipulator's x is the sensor's: state `azimuth_deg` of the legs from there.
+    """
 
     x_mm: float = 0.0
     """Manipulator's x (next: y) with the indenter above the nominal contact point."""
     y_mm: float = 0.0
-    turned_deg: float = 0.0
-    """Direction of the sensor's x in the manipulator's plane; the sensor's s is 90 deg further."""
     reach_x_mm: Range = (0.0, 0.0)
     """Permitted offsets of scenes along the sensor; the whole rectangle is tested beforehand."""
     reach_s_mm: Range = (0.0, 0.0)
@@ -197,10 +198,7 @@ class Places(Options):
 
     def place_m(self, x_mm: float, s_mm: float) -> tuple[float, float]:
         """Return the manipulator's x and y [m] for offsets on the sensor."""
-        turned = math.radians(self.turned_deg)
-        x = self.x_mm + math.cos(turned) * x_mm - math.sin(turned) * s_mm
-        y = self.y_mm + math.sin(turned) * x_mm + math.cos(turned) * s_mm
-        return 1e-3 * x, 1e-3 * y
+        return 1e-3 * (self.x_mm + x_mm), 1e-3 * (self.y_mm + s_mm)
 
     def corners_m(self) -> list[tuple[float, float]]:
         """Return the manipulator's x and y [m] at the four corners of the reach, in turn."""

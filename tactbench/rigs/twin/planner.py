@@ -28,8 +28,8 @@ STORED = "stored"
 """Name of the result "stored samples", which every recording needs."""
 REFERENCE = "reference-force"
 """Name of the result "reference force", which every recording needs."""
-LENT = "core"
-"""Name of the result of effects that the contact solver itself applies when a load needs them."""
+LENT = ("core", "fluid-pressure", "shear")
+"""Names of the effects that the contact solver itself applies, or applies when a load needs them."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Plan:
     """Included effects in the order of application, followed by the effects left out."""
     stages: tuple[EffectDescriptor, ...]
     """Descriptors of the effects to apply, in order."""
-    lent: Mapping[str, str]
-    """Effects that the contact solver may apply: name -> ``module:callable``."""
+    lent: frozenset[str]
+    """Names of the included effects that the contact solver applies."""
 
     def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
         """Return the entries, after replacing those that could be decided only after the contact was solved."""
@@ -93,8 +93,8 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     return Plan(
         kinds=kinds,
         entries=tuple(entries[effect.name] for effect in (*ordered, *left_out)),
-        stages=tuple(effect for effect in ordered if LENT not in effect.produces),
-        lent={effect.name: effect.where for effect in ordered if LENT in effect.produces},
+        stages=tuple(effect for effect in ordered if effect.name not in LENT),
+        lent=frozenset(effect.name for effect in ordered).intersection(LENT),
     )
 
 
@@ -123,16 +123,6 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
     return signed
 
 
-def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reason:
-    reason = load_object(effect.called_for)(scene, sensor)
-    if not isinstance(reason, Reason):
-        raise PluginContractError(
-            f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
-            hint="Return tactbench.plugin.Reason(called_for, text).",
-        )
-    return reason
-
-
 def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     present = {channel.kind for channel in sensor.channels()}
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
@@ -151,7 +141,14 @@ def _needed(
 
     Only an included effect makes the tokens that it consumes needed.
     """
-    reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
+    reasons: dict[str, Reason] = {}
+    for effect in effects:
+        reasons[effect.name] = reason = load_object(effect.called_for)(scene, sensor)
+        if not isinstance(reason, Reason):
+            raise PluginContractError(
+                f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
+                hint="Return tactbench.plugin.Reason(called_for, text).",
+            )
     taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
     needed = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
     before: set[str] = set()

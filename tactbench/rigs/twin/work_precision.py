@@ -24,7 +24,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
-from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
+from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
 
@@ -57,7 +57,7 @@ def study(sensor: SensorDescriptor, *, rounds: int = 5) -> CostStudy:
         f"no table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
         f"{rounds * len(RADII_MM)} whole recordings, nothing kept from the one before.",
         jobs=[
-            CostJob(name, functools.partial(_measured, sensor, scenes, name, truth, rounds), name)
+            CostJob(name, functools.partial(_measured, sensor, scenes, name, truth, rounds))
             for name in RUNGS
             if name != "reference"
         ],
@@ -102,9 +102,6 @@ def _measured(
                 worst=float(np.abs(own).max()),
                 unit=next(channel.unit for channel in sensor.spec.channels(kind)),
                 floor=math.inf if nuisances is None else nuisances.hidden() or math.inf,
-                default=fidelity == DEFAULT,
-                rung=rung,
-                settings={"family": rung},
             )
         )
     return found
@@ -126,13 +123,12 @@ def _planned(sensor: SensorDescriptor, effects: Sequence[EffectDescriptor], radi
 def _loads() -> FloatArray:
     # The golden ratio's multiples fill an interval evenly and never fall on a table's nodes.
     places = (0.5 + np.arange(1, LOADS + 1) * (math.sqrt(5) - 1) / 2) % 1.0
-    return np.asarray(5.0 * np.sort(places), dtype=np.float64)
+    return 5.0 * np.sort(places)
 
 
 def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
     """Return the (loads, channels) changes from rest with the reference settings, each load solved by itself."""
     run = prepare(sensor, scene, 1, plan, _REFERENCE)
-    run.fluid_pressure = "dc_pressure" in scene.observe
     press, read = pressed(run, names, _REFERENCE)
     rest = read(press(0.0))
     return np.stack([read(press(float(load))) - rest for load in _loads()])

@@ -231,7 +231,7 @@ class FilmSheet:
                 hint="Check the excitation's places, the skin's residual_film and the contact solver's residual.",
             )
         sums = np.bincount(contacts.owner, weights=joints, minlength=contacts.count)
-        return np.asarray(np.linalg.inv(np.diag(sums) - half.T @ half), np.float64)
+        return np.linalg.inv(np.diag(sums) - half.T @ half)
 
 
 def _logarithmic_mean(one: FloatArray, other: FloatArray, log_ratio: FloatArray) -> FloatArray:
@@ -243,4 +243,4 @@ def _logarithmic_mean(one: FloatArray, other: FloatArray, log_ratio: FloatArray)
     # (a+b)/2 (1 - d²/12) with d = ln(b/a) ~ 2 (b-a)/(a+b): next term of order d^4, 1e-12.
     half = (a + b) / 2
     mean[near] = half - (b - a) ** 2 / (12 * half)
-    return np.asarray(mean)
+    return mean

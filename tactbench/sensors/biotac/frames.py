@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
+from pydantic import BeforeValidator, Field
 
-from tactbench.plugin import Block, Quality, Source, StreamSpec
-from tactbench.plugin.devices import SpiStep
+from tactbench.plugin import Block, Quality, RigError, Source, StreamSpec
+from tactbench.plugin.devices import Options, SpiStep
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, NAMES, STREAMS
 from tactbench.sensors.biotac.codec import (
+    CHANNELS,
     COMMAND_RATE,
     INDEX,
     RESEND,
@@ -27,9 +30,6 @@ from tactbench.sensors.biotac.codec import (
     decoded,
     sampling_command,
 )
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 DEFAULT_FRAME: tuple[str, ...] = tuple(
     name for slow in (*NAMES, "PDC", "TAC", "TDC") for name in (slow, "PAC")
@@ -182,7 +182,7 @@ class FrameBatches(FrameRows):
 
     Raises
     ------
-    ValueError
+    RigError
         If `speed_hz` leaves no time for the words.
     """
 
@@ -207,9 +207,10 @@ class FrameBatches(FrameRows):
         self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
         self._within_us = self._commands * self._command_us + resends * self._word_us
         if self._paused_us(1) < self._within_us + self._word_us:
-            raise ValueError(
-                f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
-                f"fit into the time of a word, 1/{rate_hz} s"
+            raise RigError(
+                f"A clock of {speed_hz} Hz is too slow for a BioTac: {self._commands} x {self._command_us} us, the "
+                f"pauses between and {bits} bits do not fit into the time of a word, 1/{rate_hz} s.",
+                hint=f"Choose a faster clock, or fewer resends than {resends}.",
             )
         self.counts: Counter[str] = Counter()
 
@@ -281,3 +282,36 @@ class FrameBatches(FrameRows):
                     self.counts[f"resent {channel}"] += 1
                     return again
         return reply
+
+
+def _names(given: object) -> object:
+    """Return the channel names of a frame, given as text in a rig file."""
+    names = tuple(given.replace(",", " ").split()) if isinstance(given, str) else given
+    if isinstance(names, tuple) and (not names or set(names) - set(CHANNELS)):
+        raise ValueError(f"names of channels, separated by blanks, are expected: {', '.join(CHANNELS)}")
+    return names
+
+
+class BioTacOptions(Options):
+    """Options of the BioTac's driver and emulator."""
+
+    select: int = Field(default=1, ge=1, le=0xFF)
+    """Mask of the select lines that are active while this sensor is addressed; line i is bit i. On the maker's board
+    for several sensors 1, 2 and 4 select the first three [sourced: driver]."""
+    frame: Annotated[tuple[str, ...], BeforeValidator(_names)] = DEFAULT_FRAME
+    """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
+    resends: int = Field(default=0, ge=0, le=3)
+    """Number of times that every word is requested again, so that words of wrong parity can be replaced."""
+    batch_words: int | None = Field(default=None, ge=1, le=1000)
+    """Words in a batch; None: one frame. Reduce for a bridge with a short buffer: a word is 14 bytes of payload."""
+    batches_ahead: int = Field(default=8, ge=2, le=16)
+    """Number of batches sent ahead, as far as the adapter can store them: the host may be late by their duration."""
+
+
+class LogOptions(Options):
+    """Options of the reader of the BioTac's text logs."""
+
+    sensor: int = Field(default=0, ge=0)
+    """Index, from 0, of the sensor: each has one pair of columns (value, parity) in the log."""
+    rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    """Sampling commands per second, needed if the log does not state this rate."""

@@ -61,7 +61,7 @@ def core_reach_mm(from_mm: FloatArray, ray_rad: FloatArray, angle_rad: FloatArra
     """
     # Where the ray meets the facet; away from it, where the facet bends back, the core's own radius.
     leaning = np.maximum(_AXIAL * np.sin(ray_rad) + _DOWN * np.cos(ray_rad) * np.cos(angle_rad), 1e-9)
-    return np.asarray(np.minimum(CORE_MM, (_FACET_MM + _AXIAL * (RAYS_FROM_MM - from_mm)) / leaning))
+    return np.minimum(CORE_MM, (_FACET_MM + _AXIAL * (RAYS_FROM_MM - from_mm)) / leaning)
 
 
 ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)

@@ -56,7 +56,7 @@ class Electrodes:
         carry no current while one is sampled is derived: the commands address one channel, and no public text
         states how it is switched.
         """
-        return np.asarray(self.reference_per_mm / (self.reference_per_mm + self.resistances(state)))
+        return self.reference_per_mm / (self.reference_per_mm + self.resistances(state))
 
 
 def build(

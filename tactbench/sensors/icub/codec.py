@@ -292,22 +292,18 @@ class SkinDecoder:
         if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
             triangle.counts["frames of wrong length"] += 1
             return []
-        head = triangle.head
-        if data[0] == HEAD:
-            if head is not None and self._near(head, frame) and head.data == data:
-                triangle.counts["frames doubled"] += 1
-                triangle.doubled += tuple(range(IN_HEAD))
-                return []
-            triangle.head = frame
+        is_head, head = data[0] == HEAD, triangle.head
+        last = head if is_head else triangle.tail if head is None else None
+        if not is_head:
+            triangle.tail = frame
+        if last is not None and self._near(last, frame) and last.data == data:
+            triangle.counts["frames doubled"] += 1
+            triangle.doubled += tuple(range(IN_HEAD) if is_head else range(IN_HEAD, TAXELS))
+            return []
+        triangle.head = frame if is_head else None
+        if is_head:
             return [] if head is None else [self._sample(key, triangle, head, None)]
-        last, triangle.head, triangle.tail = triangle.tail, None, frame
-        if head is None:
-            if last is not None and self._near(last, frame) and last.data == data:
-                triangle.counts["frames doubled"] += 1
-                triangle.doubled += tuple(range(IN_HEAD, TAXELS))
-                return []
-            return [self._sample(key, triangle, None, frame)]
-        if frame.t_ns - head.t_ns < 0.9 * self._period_ns:
+        if head is None or frame.t_ns - head.t_ns < 0.9 * self._period_ns:
             return [self._sample(key, triangle, head, frame)]
         return [self._sample(key, triangle, head, None), self._sample(key, triangle, None, frame)]
 

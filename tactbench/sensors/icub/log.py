@@ -10,7 +10,6 @@ import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
 from tactbench.plugin.devices import CanFrame, DeviceLog, read_can_log, read_options
-from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
@@ -23,6 +22,7 @@ from tactbench.sensors.icub.codec import (
     to_block,
 )
 from tactbench.sensors.icub.options import LogOptions
+from tactbench.sensors.icub.spec import STREAMS
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
@@ -54,7 +54,13 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             commands.append(found)
     board, triangle = _chosen(path, settings, sorted(halves), len(frames))
     half = halves[board, triangle]
-    period_s, rate = _period(path, settings, half)
+    steps = np.diff([frame.t_ns for frame in half if frame.data[0] == HEAD])
+    steps = steps[steps > 0]
+    if not len(steps):
+        raise DataError(f"{path} has too few samples to compute their period.", hint="Record for longer.")
+    period_s = 1e-9 * float(np.median(steps))
+    text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
+    rate = Source(tag="measured", reference=text)
     decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
     samples = [sample for frame in half for sample in decoder.feed(frame)] + decoder.flush()
     if not samples:
@@ -101,17 +107,3 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
             hint=f"Choose one by the options board and triangle. The log has: {listed}.",
         )
     return fitting[0]
-
-
-def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
-    """Return the period between samples in seconds, and its source (option or log)."""
-    if settings.period_ms is not None:
-        text = f"{settings.period_ms} ms between samples by the option period_ms"
-        return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
-    steps = np.diff([frame.t_ns for frame in frames if frame.data[0] == HEAD])
-    steps = steps[steps > 0]
-    if not len(steps):
-        raise UsageError(f"{path} has too few samples to compute their period.", hint="State the option period_ms.")
-    period_s = 1e-9 * float(np.median(steps))
-    text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
-    return period_s, Source(tag="measured", reference=text)

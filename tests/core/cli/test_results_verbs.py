@@ -69,6 +69,16 @@ def test_a_folder_against_itself_differs_nowhere_and_what_is_not_there_is_named(
         assert nearest in ran("compare", *words, "--out", "out", code=2).stderr
 
 
+def test_folders_are_merged_with_their_tables_and_what_is_not_theirs_is_named(ran):
+    done = ran("merge", "out", "out", "--out", "both")
+    assert done.stdout == "both\n"
+    assert "30 cells, 0 recordings" in done.stderr
+    assert (ran.folder / "both" / "leaderboard.json").read_text() == ran(
+        "leaderboard", "out", "--format", "json"
+    ).stdout
+    ran("merge", "out", "--out", "both", code=2)
+
+
 def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs):
     shipped = verbs("choose", *WISH)
     assert "came with" in shipped.stderr
@@ -77,6 +87,10 @@ def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs)
         made.kept(store, "icub/force/twin/karl2016/ols/1", estimator="ols", dagger=True)
     shown = verbs("choose", *WISH)
     assert "karl2016" in shown.stdout
+    verbs("choose", "--task", "force", "--max-delay-ms", "0", code=2)
+    (best,) = json.loads(verbs("choose", *WISH, "--format", "json").stdout)
+    assert (best["task"], best["protocol"]) == ("force", "karl2016")
+    verbs("choose", *WISH, "--protocol", "deployable", code=2)
     assert "tactbench-results" in shown.stderr
     # A task of which the folder has nothing is answered from what came along, unless the folder was asked for.
     assert "came with" in verbs("choose", "--task", "curvature").stderr

@@ -146,7 +146,7 @@ def test_a_measurement_that_is_not_possible_is_a_line_and_points_are_in_order_of
 def cost_point(seconds, error, *, subject="pad"):
     return CostPoint(
         subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=0.3, default=False, rung="", settings={},
+        floor=0.3,
     )  # fmt: skip
 
 

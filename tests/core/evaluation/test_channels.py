@@ -28,3 +28,11 @@ def test_rows_belong_to_the_nearest_within_half_a_step_and_of_two_to_the_earlier
     assert nearest_rows(at(0, 10, 20), at(0, 20, 40), "press").tolist() == [0, 0, 1]
     assert nearest_rows(at(0, 10, 26), at(0, 10), "press").tolist() == [0, 1, -1]
     assert nearest_rows(at(0, 10), at(), "press").tolist() == [-1, -1]
+
+
+def test_without_a_clock_on_either_side_row_belongs_to_row():
+    timeless = StreamData(SPEC, None, np.zeros((2, 1)), None)
+    for pair in ((at(0, 10), timeless), (timeless, at(0, 10))):
+        assert nearest_rows(*pair, "press").tolist() == [0, 1]
+    with pytest.raises(DataError):
+        nearest_rows(at(0, 10, 20), timeless, "press")

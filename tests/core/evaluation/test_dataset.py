@@ -11,7 +11,7 @@ from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.plugin import Block, ChannelSpec, StreamSpec, Summary
 
-from .made import evaluated, force_task, label_task, ramp, record, sensor_of, sessions, write
+from .made import evaluated, force_task, label_task, ramp, record, sensor, sensor_of, sessions, write
 
 MS = 1_000_000
 
@@ -53,6 +53,23 @@ def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
     path = two_streams(tmp_path / "b.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
     with pytest.raises(DataError, match=r"'fz'.*'count'.*'N'"):
         load_dataset(force_task(), [path])
+
+
+@pytest.mark.parametrize(("names", "taken"), [(("fx", "fz"), 1), (("normal", "fz"), 0), (("shear", "f"), 1)])
+def test_of_several_forces_the_normal_one_is_meant_and_others_have_to_be_named(tmp_path, names, taken):
+    values = np.random.default_rng(0).normal(size=(20, 2))
+    reference = StreamSpec(name="ft", channels=tuple(ChannelSpec(name=name, kind="force", unit="N") for name in names))
+    t_ns = np.arange(20) * 10 * MS
+
+    def made(name, reference):
+        blocks = Block("taxels", t_ns, values), Block("ft", t_ns, values)
+        return write(tmp_path / name, sensor(2), *blocks, reference=(reference,))
+
+    (table,) = load_dataset(force_task(), [made("a.h5", reference)]).tables
+    assert table.y.tolist() == values[:, taken].tolist()
+    both = tuple(one.model_copy(update={"name": f"f{place}"}) for place, one in enumerate(reference.channels))
+    with pytest.raises(DataError, match="f0, f1"):
+        load_dataset(force_task(), [made("b.h5", reference.model_copy(update={"channels": both}))])
 
 
 def test_without_a_clock_rows_belong_together_only_if_they_are_equally_many(tmp_path):

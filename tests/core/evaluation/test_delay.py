@@ -13,6 +13,7 @@ from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import assumed
 from tests.core.evaluation.made import force_task, ramp, roles, sensor
+from tests.core.evaluation.test_dataset import two_streams
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
 STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
@@ -65,7 +66,10 @@ def test_a_stated_rate_that_the_clock_denies_shortens_no_delay(tmp_path, stated_
 def test_what_is_not_known_is_absent_and_said(tmp_path):
     data = load_dataset(TASK, pressed(tmp_path / "a"))
     parts, remark = reading_delay_ms(data)
-    assert (set(parts), remark) == ({"sampling", "window"}, NO_LINK)
+    assert (parts, remark) == (pytest.approx({"sampling": 12.0, "window": 240.0}), NO_LINK)
+    t = np.arange(0.0, 1000.0, 10.0)
+    both = load_dataset(force_task(features=("taxel", "ac_pressure")), [two_streams(tmp_path / "b.h5", *3 * [(t, t)])])
+    assert reading_delay_ms(both)[1] == NO_RATE, "the second stream states no rate"
     for step_ns in (0, 1_500_000_000):  # a row a press: the pause between presses is no sampling interval
         timeless = load_dataset(TASK, pressed(tmp_path / f"{step_ns}", step_ns=step_ns))
         assert reading_delay_ms(timeless) == ({}, NO_RATE)

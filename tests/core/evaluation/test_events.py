@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
+from tactbench.core.evaluation.channels import SlipReference
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.event_answers import EventRules, Scored
 from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import frame_features, frame_times, framed, summary_of
 from tactbench.core.events.labels import SlipLabels
 from tactbench.core.plugins.registry import load_registry

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import FeatureScale, apart, causal_mean, keep, part
 from tactbench.core.evaluation.splits import Assignment, choose_split, inner_splits, make_splits
@@ -29,6 +30,14 @@ def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(t
     train, test = (np.array([getattr(fold, name) for fold in folds]) for name in ("train", "test"))
     assert not (train & test).any()
     assert set(test.sum(axis=0)) == ({0, 1} if split == "in-session" else {1})
+
+
+@pytest.mark.parametrize(("split", "groups"), [("session", "abc"), ("shuffled", "abc"), ("press", "12")])
+def test_the_groups_of_rows_are_those_that_the_split_keeps_apart(tmp_path, split, groups):
+    paths = sessions(tmp_path, n=20, annotations={"press": np.repeat(["1", "2"], 10)})
+    made = load_task(force_task(splits=("press",)), paths, "deployable", split)
+    assert set(made.groups) == set(groups)
+    assert len(made.groups) == len(made.X) == 60
 
 
 def test_two_groups_that_train_are_kept_apart_where_parameters_are_chosen_too(tmp_path):

@@ -19,7 +19,7 @@ TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles
 HOLD, ROWS = 40, 200
 
 
-def three(folder, offsets=(0.0, 0.0, 0.0), hold=0.4, start=0.0):
+def three(folder, offsets=(0.0, 0.0, 0.0), hold=0.4, start=0.0, **more):
     """A ramp after a hold, in three roles, each with an offset of its own."""
     force = np.concatenate([np.zeros(HOLD), np.linspace(0, 5, ROWS - HOLD)])
 
@@ -28,7 +28,7 @@ def three(folder, offsets=(0.0, 0.0, 0.0), hold=0.4, start=0.0):
         return force[:, None] * [1.0, 2.0, -1.0] + noise + np.multiply(offsets[place], [1, -2, 3]), force
 
     start, duration = assumed(start, "N", "a test"), assumed(2.0, "s", "a test")
-    return roles(folder, make, scene=held("held", hold, start=start, duration=duration, samples=ROWS))
+    return roles(folder, make, scene=held("held", hold, start=start, duration=duration, samples=ROWS), **more)
 
 
 def answered(paths, protocol):
@@ -62,7 +62,7 @@ def test_later_rows_change_no_earlier_reading(tmp_path, first_changed):
 
 
 def test_recordings_without_a_hold_are_as_they_are_and_the_row_says_so(tmp_path):
-    for name, how in {"no hold": {"hold": 0.0}, "loaded from the start": {"start": 1.0}}.items():
+    for name, how in {"no hold": {"hold": 0.0}, "loaded": {"start": 1.0}, "no clock": {"t_ns": None}}.items():
         paths = three(tmp_path / name, (5.0, 5.0, 5.0), **how)
         result = answered(paths, "deployable")
         assert result.tare_s is None

@@ -24,3 +24,4 @@ def test_what_plugins_and_rigs_exchange_cannot_be_changed():
     found = [one for one in vars(interfaces).values() if dataclasses.is_dataclass(one)]
     assert len(found) > 5
     assert [one.__name__ for one in found if not one.__dataclass_params__.frozen] == []
+    assert interfaces.RigCheck((), ()).travel_ceiling_n == 0.0, "no force is allowed where a rig states none"

@@ -81,7 +81,9 @@ def test_a_file_that_contradicts_itself(good, tamper, says):
 @given(st.floats(0, 1, exclude_max=True), st.integers(0, 255))
 def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share, flip):
     journal, ends = tmp_path / "x.h5.partial", []
-    with RecordingWriter(tmp_path / "x.h5", about(), replace=True) as writer:
+    for name in ("x.h5", "copy.h5"):
+        (tmp_path / name).unlink(missing_ok=True)
+    with RecordingWriter(tmp_path / "x.h5", about()) as writer:
         writer.revise(labels={"object": "ball"})
         for number in range(5):
             n = np.arange(10) + 10 * number
@@ -94,7 +96,6 @@ def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share
     (tmp_path / "copy.partial").write_bytes(whole[:place] + rest)
     n = np.arange(10 * sum(end <= place for end in ends))
     try:
-        (tmp_path / "copy.h5").unlink(missing_ok=True)
         rescue(tmp_path / "copy.partial", tmp_path / "copy.h5")
         with open_recording(tmp_path / "copy.h5") as recording:
             meta, taxels = recording.meta, recording.read("taxels")

@@ -74,7 +74,9 @@ def test_the_paper_s_figures_are_drawn_as_pdf_and_png_and_nothing_else(all_of_it
     assert kinds(drawn) == CURVATURE + FORCE
     assert {path for one in drawn for path in (one.png, one.png.with_suffix(".pdf"))} == set(out.iterdir())
     for one in drawn:
-        assert one.png.read_bytes().startswith(b"\x89PNG")
+        content = one.png.read_bytes()
+        assert content.startswith(b"\x89PNG")
+        assert int.from_bytes(content[16:20]) == 700, "3.5 inches of 200 dots"
         assert one.png.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
         assert "†: " in one.caption
     assert ["forest" in one for one in said] == [True], "what is not shown"
@@ -160,4 +162,4 @@ def test_prediction_against_time_shows_every_answer(finished):
             np.testing.assert_array_equal(line.get_ydata(), answers.y_pred)
             np.testing.assert_array_equal(line.get_xdata(), answers.time_s)
             error = np.sqrt(np.mean((answers.y_true - answers.y_pred) ** 2))
-            assert here.texts[0].get_text() == f"RMSE {error:.4f} N"
+            assert here.get_title() == f"{panel.sensor}, {role}\nRMSE {error:.4f} N"

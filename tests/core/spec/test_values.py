@@ -170,6 +170,10 @@ def test_a_scenario_takes_the_place_of_the_usual_nuisances_and_is_known_by_name(
         biotac.handled("no-such")
 
 
+def test_the_spec_of_a_sensor_is_of_its_first_unit():
+    assert [Scene(name="s", unit=unit).first_unit for unit in ("1", "2")] == [True, False]
+
+
 def test_offsets_have_the_scale_of_drift_unless_they_have_their_own():
     assert Environment(drift_scale=2).scale_of_offsets == 2
     assert Environment(drift_scale=2, offset_scale=0).scale_of_offsets == 0

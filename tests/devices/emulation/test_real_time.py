@@ -36,9 +36,11 @@ def test_requests_are_answered_by_the_wall_clock(kind):
 
 @needs_pty
 def test_an_unplugged_terminal_is_gone():
-    with RealTimeDevices({"a": on("bytes", Answerer(), "unplug:start_s=0.3")}) as devices:
-        with opened(devices) as link, pytest.raises(LinkUnplugged):
-            link.read(5.0)
+    with RealTimeDevices({"a": on("bytes", Answerer())}) as devices:
+        with opened(devices) as link:
+            devices._open["a"][0]._unplugged_s = 0.0  # once it is open, however long that took
+            with pytest.raises(LinkUnplugged):
+                link.read(5.0)
         with pytest.raises(LinkError):
             opened(devices)
 

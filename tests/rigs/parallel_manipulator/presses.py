@@ -31,7 +31,7 @@ SLOW_LINE = {"baud": 2400}
 class Rig:
     """A guard, emulated devices and what presses."""
 
-    def __init__(self, kind, tmp_path, setting, address, force_driver, **faults):
+    def __init__(self, kind, tmp_path, setting, force_driver, **faults):
         self.setting = setting
         self.world = FAULTS.Pressed(setting, **faults)
         self.clock = self.world.clock
@@ -45,7 +45,7 @@ class Rig:
                     {
                         "motor": DeviceSettings(
                             f"{PACKAGE}.motor.driver:FaulhaberDriver",
-                            address or addresses["motor"],
+                            addresses["motor"],
                             options["motor"] | SLOW_LINE,
                         )
                     },
@@ -76,12 +76,12 @@ class Rig:
 
 
 @contextmanager
-def rig(kind, tmp_path, setting=None, address=None, force_driver=NET_FT, **faults):
+def rig(kind, tmp_path, setting=None, force_driver=NET_FT, **faults):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
         setting = FAULTS.replace(setting, **PATIENT)
-    made = Rig(kind, tmp_path, setting, address, force_driver, **faults)
+    made = Rig(kind, tmp_path, setting, force_driver, **faults)
     try:
         made.guard.start()
         yield made

@@ -221,7 +221,7 @@ def test_a_touch_on_a_fast_approach_ends_it(made):
         ("force_link", "unplug:start_s={0}", Trigger.FORCE_LOST),
         ("motor_link", "unplug:start_s={0}", Trigger.AXIS_LOST),
         ("motor", "motor-fault:start_s={0}", Trigger.AXIS_FAULT),
-        ("motor_link", "late:start_s={0},delay_s=9", Trigger.AXIS_SILENT),
+        ("motor_link", "late:start_s={0}1,delay_s=9", Trigger.AXIS_SILENT),
     ],
     ids=lambda value: str(value).split(":")[0],
 )

@@ -145,8 +145,8 @@ def nobody_at(world):
     return FaulhaberDriver(DriverSettings(world.devices.opener("motor"), options=options, clock=world.clock))
 
 
-@pytest.mark.parametrize("half", [b"", b"LA12", b"TPOS\r", b"POS\rGRC\rOST\r"])
-def test_a_blind_retreat_whatever_stands_on_the_line(half):
+@pytest.mark.parametrize("half", [b"", b"LA12", b"TPOS\r", b"POS\rOST\r"])
+def test_a_blind_halt_and_a_blind_retreat_whatever_stands_on_the_line(half):
     setting = FAULTS.Setting(baud=9600)
     world = FAULTS.Pressed(setting)
     guard = world.guard()
@@ -154,31 +154,21 @@ def test_a_blind_retreat_whatever_stands_on_the_line(half):
     FAULTS.Press(guard, setting, world.clock).run(2.5)
     assert world.position_m > -1e-3
     guard._press.close()
-    link = world.devices.open_link("motor")
-    link.write(half)
-    link.close()
-    with nobody_at(world) as motor:
-        position_m = motor.rescue(2.0)
+    for within_s in (None, 2.0):
+        with world.devices.open_link("motor") as link:
+            link.write(b"V-5\r")
+            world.devices.advance(world.clock() + 10**8)
+            link.write(half)
+        assert world.motor.drive.answer(Command("GN")) == "-5"
+        with nobody_at(world) as motor:
+            position_m = motor.rescue(within_s)
+        world.devices.advance(world.clock() + 10**8)
+        where_m = world.position_m
+        world.devices.advance(world.clock() + 10**9)
+        assert world.position_m == pytest.approx(where_m, abs=1e-6)
+        assert world.motor.drive.enabled
     assert position_m == pytest.approx(FAULTS.RETREAT_M, abs=5e-6)
     assert world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=20e-6)
-
-
-@pytest.mark.parametrize("half", [b"", b"LA12", b"POS\rGRC\rOST\r"])
-def test_a_motor_that_is_let_stand_blind(half):
-    world = FAULTS.Pressed(FAULTS.Setting(baud=9600))
-    link = world.devices.open_link("motor")
-    link.write(b"ANSW2\rEN\rV5\r")
-    world.devices.advance(world.clock() + 10**9)
-    link.write(half)
-    link.close()
-    assert world.motor.drive.answer(Command("GN")) == "5"
-    with nobody_at(world) as motor:
-        motor.rescue(None)
-    world.devices.advance(world.clock() + 10**8)
-    where_m = world.position_m
-    world.devices.advance(world.clock() + 10**9)
-    assert world.position_m == pytest.approx(where_m, abs=1e-6)
-    assert world.motor.drive.enabled
 
 
 def test_a_blind_retreat_that_ends_elsewhere_says_where():

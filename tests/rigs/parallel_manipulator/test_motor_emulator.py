@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.plugin.devices import EmulatorSettings
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.emulator import Motion, MotorEmulator
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 
 def emulated(**options):
-    return MotorEmulator(None, np.random.default_rng(15), FaulhaberOptions(**options))
+    return MotorEmulator(EmulatorSettings(lambda at_s: {}, np.random.default_rng(15), options))
 
 
 def joined_bytes(sent):

@@ -116,26 +116,25 @@ def test_a_rail_is_homed_away_from_the_skin(speed_m_s):
     assert len(check(RigFile.model_validate(file)).problems) == (speed_m_s < 0)
 
 
-def test_the_way_until_a_dead_force_is_noticed_is_of_the_softest_skin():
-    def way_mm(softest_n_mm):
-        (_, forces) = check(file_of(settings__stiffness__softest_n_mm=softest_n_mm)).tables
-        (row,) = [value for what, value in forces.rows if "stops responding" in what]
-        return float(row.split()[-2])
+def printed(what, **changes):
+    """Return the words of a row of the table of forces."""
+    (_, forces) = check(file_of(**changes)).tables
+    (row,) = [value for name, value in forces.rows if what in name]
+    return row.split()
 
+
+@pytest.mark.parametrize(("softest_n_mm", "way_mm"), [(2.0, 0.86), (0.1, 2.01)])
+def test_the_way_until_a_dead_force_is_noticed_is_of_the_softest_skin(softest_n_mm, way_mm):
     # Twice the tolerance of 0.4 mm, the way to a mean of 0.1 N, and 0.5 mm/s for the 20 ms of a mean.
-    assert way_mm(2.0) == pytest.approx(0.86, abs=0.005)
     # On the ramp twice that way, and 0.5 mm/s for the 20 ms of a mean.
-    assert way_mm(0.1) == pytest.approx(2.01, abs=0.005)
+    found = printed("stops responding", settings__stiffness__softest_n_mm=softest_n_mm)[-2]
+    assert float(found) == pytest.approx(way_mm, abs=0.005)
 
 
 def test_forces_are_computed_with_the_age_that_the_force_may_have():
-    def of_an_approach(age_ms):
-        (_, forces) = check(file_of(settings__limits__force_age_ms=age_ms)).tables
-        (row,) = [value for what, value in forces.rows if "approach" in what]
-        return float(row.split()[0])
-
+    late, soon = (float(printed("approach", settings__limits__force_age_ms=age_ms)[0]) for age_ms in (130.0, 30.0))
     # 0.5 mm/s on 90 N/mm for 100 ms more; printed to 0.01 N.
-    assert of_an_approach(130.0) - of_an_approach(30.0) == pytest.approx(4.5, abs=0.02)
+    assert late - soon == pytest.approx(4.5, abs=0.02)
 
 
 def test_limits_are_stated_once():

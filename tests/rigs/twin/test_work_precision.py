@@ -44,10 +44,10 @@ def test_it_runs_for_a_skin_and_says_what_it_cannot_have(sensors, name, has_it):
     found = list(measured(work_precision.study(sensors[name], rounds=1), name, Progress()))
     skipped = [one for one in found if isinstance(one, Skipped)]
     points = [one for one in found if one not in skipped]
-    assert any(point.default and point.rung == "default" for point in points)
-    assert all(one.rung == "closed-form" and one.reason for one in skipped)
-    assert ("closed-form" in {one.rung for one in skipped}) is not has_it
-    assert ("closed-form" in {point.rung for point in points}) is has_it
+    assert "default" in {point.label for point in points}
+    assert all(one.label == "closed-form" and one.reason for one in skipped)
+    assert ("closed-form" in {one.label for one in skipped}) is not has_it
+    assert ("closed-form" in {point.label for point in points}) is has_it
 
 
 @pytest.mark.parametrize("radius", [None, 2.0])

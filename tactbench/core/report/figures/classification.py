@@ -13,7 +13,7 @@ from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.report.figures.group import Group, Panel, Sketch, with_unit
-from tactbench.core.report.figures.style import COLUMN_IN, MARKERS, PAGE_IN, legend, ordered, panels
+from tactbench.core.report.figures.style import MARKERS, legend, panels
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
@@ -34,16 +34,15 @@ def confusion(group: Group) -> Sketch:
     shown = group.panels
     roles = [role for role in ("validation", "test") if role in shown[0].answers]
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
-    width = PAGE_IN if wide else COLUMN_IN
-    figure, axes = panels(len(shown), len(roles), 0.85 * width / len(roles), width_in=width)
+    figure, axes = panels(len(shown), len(roles), wide=wide)
     for line, panel in zip(axes, shown, strict=True):
         names = list(map(class_name, panel.row["classes"]))
         for here, role in zip(line, roles, strict=True):
             answers = panel.answers[role]
             ConfusionMatrixDisplay.from_predictions(
                 answers.y_true, answers.y_pred, labels=range(len(names)), display_labels=names, normalize="true",
-                values_format=".0%", include_values=len(names) <= NUMBERS_UP_TO, im_kw={"vmin": 0.0, "vmax": 1.0},
-                text_kw={"size": 5.0}, cmap="Blues", colorbar=False, ax=here,
+                values_format=".0%", include_values=len(names) <= NUMBERS_UP_TO, im_kw={"vmin": 0, "vmax": 1},
+                text_kw={"size": "small"}, cmap="Blues", colorbar=False, ax=here,
                 xticks_rotation=90 if max(map(len, names)) > 4 and len(names) > 3 else 0.0,
             )  # fmt: skip
             here.set(title=f"{panel.sensor}, {role}", xlabel=with_unit("predicted", group.unit), ylabel="")
@@ -68,20 +67,20 @@ def embedding(group: Group) -> Sketch:
         If a sensor's test set cannot be embedded.
     """
     found = [(panel, *_embedded(group.results, panel)) for panel in group.panels]
-    figure, axes = panels(len(found), 2, 1.55)
+    figure, axes = panels(len(found), 2)
     for (by_class, by_force), (panel, rows, xy) in zip(axes, found, strict=True):
         test, classes = panel.answers["test"], panel.row["classes"]
-        for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
-            by_class.plot(*xy[test.y_true[rows] == place].T, MARKERS[place % len(MARKERS)], markersize=2.0,
-                          markeredgewidth=0, color=colour, label=class_name(one), rasterized=True)  # fmt: skip
+        for place, one in enumerate(classes):
+            by_class.plot(*xy[test.y_true[rows] == place].T, MARKERS[place % len(MARKERS)], label=class_name(one),
+                          rasterized=True)  # fmt: skip
         force_n = test.force_n[rows]
         if np.isfinite(force_n).any():
-            shade = by_force.scatter(*xy.T, c=force_n, s=4.0, cmap="cividis", linewidths=0, rasterized=True)
+            shade = by_force.scatter(*xy.T, c=force_n, cmap="cividis", rasterized=True)
             figure.colorbar(shade, ax=by_force, label="force [N]")
         for here, what in ((by_class, group.quantity), (by_force, "force")):
             here.set(title=f"{panel.sensor}, by {what}", xticks=[], yticks=[])
             here.spines[:].set_visible(True)
-    legend(figure, axes[:, 0], ncols=6, title=with_unit(group.quantity, group.unit), markerscale=1.8)
+    legend(figure, axes[:, 0], title=with_unit(group.quantity, group.unit))
     caption = (
         f"t-SNE of the test set's features as the estimator read them, of at most {AT_MOST} rows; left by "
         f"{group.quantity}, right by the force of the reference. Near points look alike to the estimator; distances "

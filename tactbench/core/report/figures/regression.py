@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.report.figures.group import Group, Sketch, with_unit
-from tactbench.core.report.figures.style import BLACK, GREY, LINES, corner, panels
+from tactbench.core.report.figures.style import panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.task import VectorTarget
 from tactbench.core.tables.numbers import score_with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_DOTS: dict[str, Any] = {"markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
 
 
 def prediction_against_time(group: Group) -> Sketch:
@@ -32,19 +25,18 @@ def prediction_against_time(group: Group) -> Sketch:
     shown = [panel for panel in group.panels if "train" in panel.answers]
     if not shown:
         raise NotApplicable(f"split {group.row['split']!r} has one training set for each fold, not a common one")
-    figure, axes = panels(len(shown), 2, 1.35, sharey="row")
+    figure, axes = panels(len(shown), 2, sharey="row")
     for line, panel in zip(axes, shown, strict=True):
         for here, role in zip(line, ("train", "test"), strict=True):
             answers = panel.answers[role]
             time = end_to_end(answers)
             order = np.lexsort((time, answers.recording))
             breaks = np.flatnonzero(np.diff(answers.recording[order])) + 1  # a line breaks at each new recording
-            here.plot(time[order], answers.y_true[order], ".", color=GREY, **_DOTS)
+            here.plot(time[order], answers.y_true[order], ".", color="grey", rasterized=True)
             predicted = answers.y_pred[order].astype(np.float64)
             across, upwards = (np.insert(values, breaks, np.nan) for values in (time[order], predicted))
-            here.plot(across, upwards, "-", color=LINES[0], linewidth=0.7)
-            here.set_title(f"{panel.sensor}, {role}")
-            _write_error(here, group, answers.y_true, answers.y_pred)
+            here.plot(across, upwards, "-", color="C0")
+            here.set_title(f"{panel.sensor}, {role}\n{_error(group, answers.y_true, answers.y_pred)}")
             # A recording without clock counts its rows.
             rows = np.array_equal(answers.time_s, answers.row)
             here.set_xlabel("row of the recording" if rows else "time [s]")
@@ -57,11 +49,11 @@ def prediction_against_time(group: Group) -> Sketch:
     return group.sketch("prediction-against-time", title, caption, figure)
 
 
-def _write_error(axes: Axes, group: Group, true: FloatArray, predicted: FloatArray) -> None:
-    """Write the task's error of the answers in a panel into its corner; of a component of a vector, its RMSE."""
+def _error(group: Group, true: FloatArray, predicted: FloatArray) -> str:
+    """Return the task's error of the answers in a panel as text; of a component of a vector, its RMSE."""
     name = "rmse" if isinstance(group.task.target, VectorTarget) else group.task.metric
     value = metric_called(name).of(true, predicted)
-    corner(axes, f"{METRIC_NAMES.get(name, name)} {score_with_unit(value, group.task.unit)}")
+    return f"{METRIC_NAMES.get(name, name)} {score_with_unit(value, group.task.unit)}"
 
 
 def end_to_end(answers: Answers) -> FloatArray:
@@ -85,15 +77,14 @@ def residuals(group: Group) -> Sketch:
         for place, name in enumerate(names)
     ]
     columns = min(2, len(shown))
-    figure, axes = panels(-(-len(shown) // columns), columns, 2.3, sharex=True, sharey=True)
+    figure, axes = panels(-(-len(shown) // columns), columns, sharex=True, sharey=True)
     every = np.concatenate([values for _, *both in shown for values in both])
     ends = [every.min(), every.max()]
     for here, (title, true, predicted) in zip(axes.flat, shown, strict=False):
-        here.plot(true, predicted, ".", color=LINES[0], alpha=0.5, **_DOTS)
-        here.plot(ends, ends, "-", color=BLACK, linewidth=1.0)
-        here.set_title(title)
+        here.plot(true, predicted, ".", color="C0", rasterized=True)
+        here.plot(ends, ends, "-", color="black")
+        here.set_title(f"{title}\n{_error(group, true, predicted)}")
         here.set_aspect("equal")
-        _write_error(here, group, true, predicted)
         here.tick_params(labelbottom=True)
         here.set_xlabel(with_unit(f"target {group.quantity}", group.task.unit))
     for here in axes.flat[len(shown) :]:

@@ -12,7 +12,7 @@ from tactbench.core.cost.precision import SHARE, diagrams
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
 from tactbench.core.plugins.interfaces import CostPoint
-from tactbench.core.report.figures.style import BLACK, GREY, LINES, MARKERS, PAGE_IN, legend, panels, save, styled
+from tactbench.core.report.figures.style import MARKERS, legend, panels, save, styled
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
@@ -35,21 +35,19 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
     """
     shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
     times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
-    figure, axes = panels(1, len(times), 3.4, width_in=PAGE_IN, sharey=True)
+    figure, axes = panels(1, len(times), wide=True, sharey=True)
     for here, time in zip(axes[0], times, strict=True):
         own = [one for one in shown if TIMES[one["knob"]] == time]
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
             place = list(TIMES).index(knob)
-            line = "" if knob == "estimator" else "-"
-            texts = [str(one["value"]) for one in path]
-            _path(here, [one[time] for one in path], [one["score"] for one in path], texts, place, knob, line=line)
+            points = [(one[time], one["score"], str(one["value"])) for one in path]
+            _draw_points(here, points, place, line="" if knob == "estimator" else "-", label=knob)
             for one in path:
                 if one["ci_low"] is not None and one["ci_high"] is not None:
-                    here.vlines(one[time], one["ci_low"], one["ci_high"], LINES[place % len(LINES)], linewidth=0.6)
+                    here.vlines(one[time], one["ci_low"], one["ci_high"], color=f"C{place}")
         if known["trivial"] is not None:
-            here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
+            here.axhline(known["trivial"], color="grey", ls="--", label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
-        _plain_numbers(here.xaxis)
     axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
@@ -70,38 +68,26 @@ def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
     The dashed line is a third of the observable's noise.
     """
     found = diagrams(points)
-    figure, axes = panels(-(-len(found) // 2), min(2, len(found)), 3.0, width_in=PAGE_IN)
-    for here in axes.flat[len(found) :]:
-        here.set_visible(False)
-    for here, ((subject, observable), group) in zip(axes.flat, found.items(), strict=False):
-        errors = [max(one.error, 1e-12) for one in group]  # a logarithmic axis cannot show 0
-        _path(here, [one.seconds for one in group], errors, [one.label for one in group], 0, "settings", line="")
+    figure, axes = panels(1, len(found), wide=True)
+    for here, ((subject, observable), group) in zip(axes[0], found.items(), strict=True):
+        _draw_points(here, [(one.seconds, one.error, one.label) for one in group], 0, line="")
         if math.isfinite(group[0].floor):
-            here.axhline(SHARE * group[0].floor, color=BLACK, ls="--", lw=0.8, label="a third of the noise")
+            here.axhline(SHARE * group[0].floor, color="black", ls="--", label="a third of the noise")
         here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
                  ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
-        _plain_numbers(here.xaxis)
-        _plain_numbers(here.yaxis)
     figure.suptitle(title)
     legend(figure, axes.flat)
     return figure
 
 
-def _plain_numbers(axis: Any) -> None:
-    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers of ten."""
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
-
-
-def _path(
-    here: Axes, across: Sequence[float], upwards: Sequence[float], texts: Sequence[str], place: int, name: str, *,
-    line: str,
-) -> None:  # fmt: skip
-    """Draw points with one text each, joined by a line of the style `line`; `place` selects colour and marker."""
-    colour = LINES[place % len(LINES)]
-    here.plot(across, upwards, MARKERS[place] + line, color=colour, markersize=4, linewidth=1.0, label=name)
-    for text, x, y in zip(texts, across, upwards, strict=True):
-        here.annotate(visible(text), (x, y), (3, 3), textcoords="offset points", color=colour, fontsize=5.5)
+def _draw_points(
+    here: Axes, points: Sequence[tuple[float, float, str]], place: int, *, line: str, label: str = ""
+) -> None:
+    """Draw points with a text beside each, joined by a line of the style `line`; `place` selects colour and marker."""
+    across, upwards, texts = zip(*points, strict=True)
+    here.plot(across, upwards, MARKERS[place] + line, color=f"C{place}", label=label)
+    for x, y, text in zip(across, upwards, texts, strict=True):
+        here.annotate(f" {visible(text)}", (x, y), color=f"C{place}")
 
 
 _COLUMNS = {

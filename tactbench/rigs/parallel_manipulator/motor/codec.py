@@ -26,12 +26,8 @@ INVALID_PARAMETER = "Invalid parameter"
 NOT_AVAILABLE = "Command not available"
 OVERTEMPERATURE = "Overtemperature - drive disabled"
 """Answer of a drive that is too hot. The manual typesets a dash; two public drivers match the hyphen (sourced)."""
-ACKNOWLEDGED = frozenset(
-    ("EN", "DI", "LA", "M", "V", "HO", "SP", "AC", "DEC", "LL", "APL", "LPC", "LCC", "CORRIDOR", "ANSW", "SOR")
-)
-"""Commands that the drive answers by ``OK`` (sourced: the manual)."""
 TEXTS = ("VER", "GTYP", "GSER")
-"""Queries that the drive answers by a text; it answers all others by a number."""
+"""Queries that the drive answers by a text; it answers all others by a number, and commands by ``OK``."""
 
 
 class Command(NamedTuple):
@@ -92,16 +88,12 @@ class Line(NamedTuple):
     t_ns: int = 0
     """Time of receipt of the line's first byte [ns]."""
 
-    def answers(self, name: str) -> bool:
-        """Return True if the line may be the answer to a command; a refusal may answer any command.
+    def answers(self, query: str) -> bool:
+        """Return True if the line may be the answer to a query.
 
-        A late answer to an earlier command of the same kind passes, too, as answers do not name their command.
+        A late answer to an earlier query of the same kind passes, too, as answers do not name their query.
         """
-        if self.kind is Kind.REFUSAL:
-            return True
-        if name.upper() in ACKNOWLEDGED:
-            return self.kind is Kind.OK
-        return self.kind is Kind.VALUE or (self.kind is Kind.TEXT and name.upper() in TEXTS)
+        return bool(query) and (self.kind is Kind.VALUE or (self.kind is Kind.TEXT and query in TEXTS))
 
 
 def _read_line(raw: bytes, t_ns: int) -> Line:

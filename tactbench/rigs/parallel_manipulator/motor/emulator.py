@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
-
-import numpy as np
 
 from tactbench.plugin.devices import (
     CanFrame,
@@ -61,7 +59,6 @@ _READ_BACK = {
     "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GPL": "GPL",
     "GNL": "GNL",
 }  # fmt: skip
-_ABOUT = {"VER": "EMULATOR", "GTYP": "linear motor, Faulhaber ASCII", "GSER": "0"}
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
@@ -118,13 +115,13 @@ class Drive:
 
     Parameters
     ----------
-    load
-        Function of the force on the motor; None: no force at any time.
     options
         Options with the units of the drive, its home and its ends of travel.
 
     Attributes
     ----------
+    load
+        Function of the force on the motor; None: no force at any time.
     stops
         Mechanical ends of travel [m].
     settings
@@ -135,8 +132,9 @@ class Drive:
         True if the drive is too hot: it has no power until it has cooled and is enabled again.
     """
 
-    def __init__(self, load: Load | None, options: FaulhaberOptions) -> None:
-        self.load, self.now_s = load, 0.0
+    def __init__(self, options: FaulhaberOptions) -> None:
+        self.load: Load | None = None
+        self.now_s = 0.0
         self._options, towards = options, options.homes_towards()
         begin_m = options.home_m - towards * REACH_M
         if towards and options.retreat_m is not None:
@@ -258,7 +256,7 @@ class Drive:
             case _ if name in _READ_BACK:
                 found = self.settings[_READ_BACK[name]]
             case _:
-                return _ABOUT.get(name)
+                return "EMULATOR" if name == "VER" else None
         return str(int(found))
 
 
@@ -275,31 +273,23 @@ class MotorFault(Fault):
 class MotorEmulator(DeviceEmulator):
     """Emulated drive with its motor, and the speed of its serial line.
 
-    Parameters
+    Attributes
     ----------
-    load
-        Function of the force on the motor; None: no force at any time.
-    rng
-        Random generator for the bytes of garbled lines.
-    options
-        Options of the motor and its drive.
     faults
         Faults of the drive; may be changed at any time.
+
+    Raises
+    ------
+    UsageError
+        For unknown options or faults.
     """
 
-    def __init__(
-        self,
-        load: Load | None,
-        rng: np.random.Generator,
-        options: FaulhaberOptions | None = None,
-        *,
-        faults: Iterable[MotorFault] = (),
-    ) -> None:
-        options = options or FaulhaberOptions()
-        self.drive = Drive(load, options)
-        self.faults = list(faults)
+    def __init__(self, settings: EmulatorSettings) -> None:
+        options = read_options(FaulhaberOptions, settings.options, "faulhaber")
+        self.drive = Drive(options)
+        self.faults = [MotorFault.parse(text) for text in settings.faults]
         self._byte_s = line_time_s(1, options.baud)
-        self._rng = rng
+        self._rng = settings.rng
         self._seen: Counter[Fault] = Counter()
         self._reader = CommandReader()
         self._now_s = self._in_free_s = self._out_free_s = -math.inf
@@ -368,9 +358,3 @@ class MotorEmulator(DeviceEmulator):
         self._out_free_s = first_s + (len(line) - 1) * self._byte_s
         # A host stamps a line at its first byte, and has it at its last.
         self._out += [(first_s, bytes(line[:1])), (self._out_free_s, bytes(line[1:]))]
-
-
-def build(settings: EmulatorSettings) -> MotorEmulator:
-    """Return an emulated drive; raises UsageError for unknown options or faults."""
-    options = read_options(FaulhaberOptions, settings.options, "faulhaber")
-    return MotorEmulator(None, settings.rng, options, faults=map(MotorFault.parse, settings.faults))

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import LowModes
+from tactbench.rigs.twin.contact.media import LowModes, Medium
 
 TOLERANCE = 1e-6
 """Largest relative residual of a solution that is returned."""

@@ -12,8 +12,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FluidBackedShell, SkinGrid
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium, Spectrum
 from tactbench.rigs.twin.geometry import outer_radius_mm
 
 

@@ -10,8 +10,7 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.plugin.simulation import SkinGrid, SkinSheet
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import STEEPEST, around_mm
-from tactbench.rigs.twin.shapes import RIM
+from tactbench.rigs.twin.geometry import RIM, STEEPEST, around_mm
 
 RESOLVED_CELLS = 3.0
 """Smallest contact radius, in cells, at which the mesh does not affect the result. Measured on the ideal grid with a
@@ -106,5 +105,4 @@ def _active(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_]:
     else:
         low, high, arc = (edge.to("mm") for edge in sheet.pad)
         along, across = (x_mm >= low) & (x_mm <= high), s_mm <= arc / 2
-    active: npt.NDArray[np.bool_] = along[:, None] & across[None, :]
-    return active
+    return np.asarray(along[:, None] & across[None, :])

@@ -10,8 +10,11 @@ import math
 
 from tactbench.plugin import ChannelKind, Quantity, Scene, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
-from tactbench.rigs.twin.effects.heated_core import NEEDED, THERMISTOR
 
+NEEDED = ("heater_power", "heat_resistance", "heat_capacity")
+"""Names of the parameters that a sensor with a heated core must state."""
+THERMISTOR = ("thermistor_b", "thermistor_p", "thermistor_q")
+"""Names of the parameters that a sensor with a thermistor must state."""
 NOT_OBSERVED = "no observed channel depends on it"
 NO_LOAD = "the scene has no load: 0 N throughout"
 NO_FLUID = "the skin holds no fluid"

@@ -104,7 +104,7 @@ def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nui
     field = math.sqrt(share * channels / dimensions) * (basis @ (basis.T @ smooth))
     names = [channel.name for channel in run.sensor.spec.channels(kind)]
     recorded = [names.index(channel.name) for channel in track.channels if channel.kind == kind]
-    return np.asarray(math.sqrt(1.0 - share) * white + field[recorded])
+    return math.sqrt(1.0 - share) * white + field[recorded]
 
 
 def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
@@ -122,7 +122,7 @@ def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
     columns = np.stack([u, v, u * u, u * v, v * v], axis=1)
     columns -= columns.mean(axis=0)
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)])
+    return left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)]
 
 
 def _scaled(values: FloatArray) -> FloatArray:

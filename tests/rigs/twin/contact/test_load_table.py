@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin import load_object
-from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.load_table import build_table
+from tactbench.rigs.twin.contact.load_table import Interpolant, build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.shell import with_core
 from tactbench.rigs.twin.geometry import Contact, gap_mm
@@ -76,13 +75,6 @@ def test_rest_is_exact_tiny_loads_are_continuous_and_loads_beyond_are_held(specs
     np.testing.assert_array_equal(table(np.array([0.0]))[0], rest)
     # A nanonewton moves no reading by more than a nanonewton's worth of the steepest slope (1e4 counts/N).
     np.testing.assert_allclose(table(np.array([1e-9]))[0], rest, atol=1e-5)
-
-
-def test_a_scene_without_load_solves_nothing(specs):
-    press = _press(specs["icub"], 10.0, -0.3)
-    table = build_table(press, lambda state: np.array([state.depth_mm]), largest_n=0.0, tolerance=np.ones(1))
-    assert not press._solutions
-    np.testing.assert_array_equal(table(np.zeros(4)), np.zeros((4, 1)))
 
 
 @given(st.lists(st.floats(0.05, 1.0), min_size=1, max_size=12), st.data())

@@ -9,9 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.rigs.twin.effects.skin_mode import Mode, is_caught, slip_s, swing
-from tactbench.rigs.twin.effects.stick_slip import STICK, Dragged, Drive
-from tactbench.rigs.twin.partial_slip import shear_modulus_mpa
+from tactbench.rigs.twin.contact.tangential import shear_modulus_mpa
+from tactbench.rigs.twin.effects.stick_slip import STICK, Dragged, Drive, Mode, is_caught, slip_s, swing
 from tests.oracles.layers import bonded_layer
 
 

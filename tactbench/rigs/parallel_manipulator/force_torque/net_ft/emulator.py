@@ -71,8 +71,6 @@ class RdtEmulator(DeviceEmulator):
         self._now_s = 0.0
         self._next: int | None = None
         """Number of the sensor sample that is sent next; None: the box is not sampling."""
-        self._left = 0
-        """Number of records still to be sent; 0: unlimited, until stopped."""
         self._sequence = 1
         self._held: list[Sent] = []
         """Datagrams delayed by a fault until the next one is sent."""
@@ -84,10 +82,9 @@ class RdtEmulator(DeviceEmulator):
         """
         sent = self.poll(now_s)
         assert isinstance(piece, bytes)
-        if request := decode_request(piece):
-            command, self._left = request
+        if request := decode_request(piece):  # the driver asks for records until it stops the box, not for a number
             # The first sample after the request: no sample is older than its request.
-            self._next = None if command is Command.STOP else math.floor(self._now_s * SENSOR_RATE_HZ) + 1
+            self._next = None if request[0] is Command.STOP else math.floor(self._now_s * SENSOR_RATE_HZ) + 1
             self._sequence, self._held = 1, []
         return sent
 
@@ -107,16 +104,14 @@ class RdtEmulator(DeviceEmulator):
         at_s = sample / SENSOR_RATE_HZ
         # Number by number: numpy would take longer for six, and this is done a thousand times a second.
         sensed = self._senses(at_s)
-        wrench = [(sensed.get(name, 0.0), end) for name, end in zip(AXES, LARGEST, strict=True)]
-        saturated = any(abs(value) >= end for value, end in wrench) or any(
-            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
-        )
-        counts = self.options.counts([min(max(value, -end), end) for value, end in wrench]).tolist()
+        wrench = [sensed.get(name, 0.0) for name in AXES]
+        within = [min(max(value, -end), end) for value, end in zip(wrench, LARGEST, strict=True)]
+        saturated = within != wrench or any(one.name == "saturated" and one.active(at_s) for one in self.faults)
+        counts = self.options.counts(within).tolist()
         status = SATURATION | ERROR_SUMMARY if saturated else 0
         record = encode_record(self._sequence, (sample + 1) % SEQUENCE_MODULUS, status, counts)
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
-        self._left -= 1
-        self._next = sample + self.options.every if self._left else None
+        self._next = sample + self.options.every
         return self._on_the_way(record, at_s)
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
