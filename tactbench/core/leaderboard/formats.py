@@ -29,7 +29,9 @@ def latex(table: Table, view: View) -> str:
     names = view.columns or _IN_A_PAPER
     grids = []
     for block in table.blocks:
-        shown = grid(block, replace(view, columns=names)).compact()
+        # A column of dashes shows that no answer has a place.
+        keep = ("place",) if any(line.texts["place"] for line in block.lines) else ()
+        shown = grid(block, replace(view, columns=names)).compact(keep)
         grids.append(replace(shown, title=f"{block.title} · {block.setting} · {block.origin}"))
     return latex_of([*grids, *table.sections], wide=False)
 

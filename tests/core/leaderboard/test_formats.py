@@ -35,6 +35,12 @@ def test_json_and_csv_hold_the_cells_of_the_table():
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
 
 
+def test_latex_has_a_column_of_dashes_where_no_answer_is_better_than_the_trivial_one():
+    rows = [row(score=2.0), row(estimator="mean", is_baseline=True)]
+    lines = written("latex", rows).decode().splitlines()
+    assert [line.split(" & ")[0] for line in lines if " & " in line] == ["place", "--", ""]
+
+
 @pytest.mark.parametrize("view", [DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))])
 def test_markdown_shows_the_cells_of_the_table_as_text(view):
     table = build_table(hostile_rows())
