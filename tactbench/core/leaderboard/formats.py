@@ -14,10 +14,9 @@ from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import WHOLE, View, document, grid
 from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
 from tactbench.core.tables import terminal
-from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex as latex_of
 from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text import json_text
+from tactbench.core.tables.text import csv_text, json_text
 
 SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table"}
 """Output format by suffix of the file."""
