@@ -17,7 +17,7 @@ from tactbench.core.leaderboard.names import (
     split_name,
 )
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import View, best, grids, known_columns
+from tactbench.core.leaderboard.view import ALL, best, grids, known_columns
 from tactbench.core.tables.text_table import Entry
 
 from .rows import hostile_rows, row
@@ -91,9 +91,9 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
 def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row()]))
     assert grid.columns == ("place", "sensor", "estimator", "score", "interval", "training")
-    (grid,) = grids(build_table([row(**FLOOR)]), View(wide=True))
+    (grid,) = grids(build_table([row(**FLOOR)]), ALL)
     assert {"beyond floor", "test samples", "latency p50", "cell"} <= set(grid.columns)
-    (grid,) = grids(build_table([row(cell="a/b")]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
+    (grid,) = grids(build_table([row(cell="a/b")]), known_columns(["cell", "score", "rank", "cell"]))
     assert grid.lines == (("a/b", "0.5000", "1"),)
     with pytest.raises(UnknownNameError, match=r"'score'.*cell"):
         known_columns(["scor"])
