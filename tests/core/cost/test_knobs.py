@@ -137,9 +137,9 @@ def test_a_measurement_that_is_not_possible_is_a_line_and_points_are_in_order_of
         raise NotApplicable("no film", hint="")
 
     points = [cost_point(2.0, 0.1), cost_point(1.0, 0.2), cost_point(1.0, 0.5, subject="dome")]
-    jobs = [CostJob("a", lambda: points), CostJob("b", refuses, "fine")]
+    jobs = [CostJob("a", lambda: points), CostJob("b", refuses)]
     found = list(measured_twin(CostStudy("t", "r", jobs), "pad", Progress()))
-    assert found == [*points, Skipped("pad", "b", "fine", "no film")]
+    assert found == [*points, Skipped("pad", "b", "no film")]
     assert diagrams(points) == {("pad", "taxel"): points[1::-1], ("dome", "taxel"): points[2:]}
 
 
