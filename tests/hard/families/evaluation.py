@@ -21,7 +21,7 @@ from tactbench.plugin import Block, ChannelSpec, EstimatorDescriptor, Quality, S
 from tests.core.evaluation.made import FORCE, evaluated, force_task, label_task, sensor_of, write
 from tests.hard.cases import Case, Family
 
-QUICK: dict[str, dict[str, Any]] = dict.fromkeys(("forest", "extra-trees"), {"n_estimators": 5})
+QUICK: dict[str, dict[str, Any]] = {name: {"n_estimators": 5} for name in ("forest", "extra-trees")}
 """Parameters that make an estimator quick, and leave it the same code."""
 ROLES = ("train", "validation", "test")
 
