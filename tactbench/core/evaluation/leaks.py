@@ -108,7 +108,7 @@ def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
     if length < 2:
         return np.zeros(0, np.uint64), np.zeros(0, np.int64), length
     windows = np.lib.stride_tricks.sliding_window_view(rows, length)
-    changing = (np.diff(windows, axis=1) != 0).sum(axis=1) >= CHANGES * (length - 1)
+    changing = (np.diff(windows, axis=1) != 0).mean(axis=1) >= CHANGES
     starts = np.flatnonzero(changing)
     return (windows[starts] * _factors(length)).sum(axis=1, dtype=np.uint64), starts, length
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from pydantic import Field
-
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.spec.quantity import Frozen
 
@@ -16,7 +14,7 @@ class ProtocolSpec(Frozen):
 
     name: str
     title: str
-    discard_samples: int = Field(default=0, ge=0)
+    discard_samples: int = 0
     """Samples dropped at the start of every recording."""
     discard_hold: bool = False
     """Drop the hold before the press (the set-up's initialization) if the recording's scene states one."""
@@ -33,9 +31,9 @@ class ProtocolSpec(Frozen):
     """True to require recordings with the roles train, validation and test, and split by these roles."""
     first_row_only: bool = False
     """Keep only the first row of every recording, to test recordings for leaks, not sensors: with every task."""
-    every: int = Field(default=1, ge=1)
+    every: int = 1
     """N to keep only each N-th sample from the first, as from a sensor with an N times lower sampling rate."""
-    k: int | None = Field(default=None, ge=0)
+    k: int | None = None
     """Number of earlier samples that the mean filter includes; None to use the estimator's own or chosen number."""
 
 

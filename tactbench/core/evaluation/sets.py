@@ -120,8 +120,8 @@ def keep(data: Dataset, protocol: ProtocolSpec, rows: Mask, what: str, counts: C
     if protocol.window_over == "consecutive samples":
         # `place` does not count rows with a dropped-out channel: a filter in use skips such a row and goes on. A jump
         # in it is a row that belongs to another set.
-        breaks = (np.diff(recording[good], prepend=0) != 0) | (np.diff(place[good], prepend=place[good][0] - 1) != 1)
-        segment = np.cumsum(breaks)
+        breaks = (np.diff(recording[good]) != 0) | (np.diff(place[good]) != 1)
+        segment = np.append(0, np.cumsum(breaks))
     else:
         segment = recording[good]
     y, time_s, row, labelled = (

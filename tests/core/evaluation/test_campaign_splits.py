@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits, shots, training_sessions
@@ -62,3 +63,7 @@ def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     paths = sessions(tmp_path, ("day-10", "day-9", "day-2", "both"), ROWS, role="train")
     data = load_dataset(force_task(), paths + sessions(tmp_path / "test", ("both", "last"), ROWS, role="test"))
     assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"
+    assert choose_split(force_task(), DEPLOYABLE, data, "few-shot-3") == "few-shot-3"
+    for some, split in ((data, "few-shot-4"), (load_dataset(force_task(), paths), "few-shot-1")):
+        with pytest.raises(UsageError):
+            choose_split(force_task(), DEPLOYABLE, some, split)

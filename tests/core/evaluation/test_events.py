@@ -126,6 +126,8 @@ def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp
     result = run(paths)
     assert any("role validation" in one for one in result.remarks)
     assert result.score == 1.0
+    with pytest.raises(DataError, match="divided"):
+        run([*paths[:2], *paths[-4:]])
 
 
 def test_a_detector_that_alarms_at_no_threshold_that_is_allowed_is_scored_by_those_that_are_not(tmp_path):

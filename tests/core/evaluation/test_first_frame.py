@@ -41,3 +41,18 @@ def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_p
 def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tmp_path):
     with pytest.raises(NotApplicable, match="'a'"):
         run(sessions(tmp_path), task=force_task())
+
+
+@pytest.mark.parametrize(
+    ("n", "labels", "right"), [(1, "b", False), (2, "bb", True), (2, ["", "b"], False), (2, ["b", "c"], False)]
+)
+def test_first_rows_are_asked_where_more_rows_follow_and_all_have_one_answer(tmp_path, n, labels, right):
+    for place in range(4):
+        object_ = [one and f"{one}{place % 2}" for one in labels]
+        record(tmp_path / f"{place}.h5", np.ones((n, 2)) * place, annotations={"object": object_}, trial=str(place))
+    paths = sorted(tmp_path.glob("*.h5"))
+    if right:
+        assert run(paths, split="recording").n_test == 4
+        return
+    with pytest.raises(NotApplicable):
+        run(paths, split="recording")

@@ -7,10 +7,15 @@ from functools import partial
 
 import numpy as np
 import pytest
+from sklearn import config_context
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV, GroupKFold
+from sklearn.pipeline import make_pipeline
 
 from tactbench.core.errors import DataError, PluginContractError
-from tactbench.core.evaluation.fitting import answers, fit
+from tactbench.core.evaluation.fitting import answers, fit, routed
 from tactbench.core.evaluation.folds import PLAIN, load_task
+from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import installed
 
 from .made import evaluated, force_task, label_task, ramp, record, sessions
@@ -107,6 +112,32 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
     result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
     assert [re.findall("'(.)' in (.)", found) for found in result.findings] == [[("a", "0"), ("b", "1"), ("c", "2")]]
+
+
+def test_training_rows_too_few_to_choose_by_are_refused_and_not_where_nothing_is_chosen(tmp_path):
+    paths = sessions(tmp_path, "ab", n=4)
+    with pytest.raises(DataError, match="hyper-parameters"):
+        evaluated(force_task(), paths, "ridge", split="session")
+    assert evaluated(force_task(), paths, "mean", split="session").n_test == 8
+
+
+class Grouped(Answering):
+    def fit(self, X, y, groups):
+        super().fit(X, y)
+
+
+def test_arguments_of_fit_are_cut_to_the_training_rows(tmp_path):
+    data = load_task(force_task(), sessions(tmp_path, n=20), "deployable", "session")
+    train = prepared(data.assignments[0], data.data, data.rules, 0, Counter()).train
+    given = {name: of(train) for name, of in routed(Grouped(), data, {"row": np.arange(60), "way": "x"}).items()}
+    assert {name: list(value) for name, value in given.items()} == {
+        "groups": ["b"] * 20 + ["c"] * 20, "row": [*range(20, 60)], "way": ["x"],
+    }  # fmt: skip
+    search = make_pipeline(GridSearchCV(Ridge(), {"alpha": [1.0, 2.0]}, cv=GroupKFold(2)))
+    assert [*routed(search, data, {})] == ["gridsearchcv__groups"]
+    assert routed(Answering(), data, {}) == {}
+    with config_context(enable_metadata_routing=True):
+        assert [*routed(search, data, {})] == ["groups"]
 
 
 def test_answers_that_overflow_are_named(tmp_path):

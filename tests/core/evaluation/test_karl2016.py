@@ -26,6 +26,7 @@ def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path)
         X, force = ramp(seed)
         X[700, 1] += 5000.0
         X[100, 0] += 5000.0  # among the first 600: dropped anyway
+        X[900, 2] += 3.5 * X[600:, 2].std() - (X[900, 2] - X[600:, 2].mean())
         force[800] -= 500.0
         return X, force
 
@@ -34,7 +35,7 @@ def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path)
     X, force = with_outliers(2)
     late = np.column_stack([X, force])[600:]
     by_hand = (np.abs(late - late.mean(axis=0)) <= 3 * late.std(axis=0)).all(axis=1)
-    assert not by_hand[[100, 200]].any()
+    assert not by_hand[[100, 200, 300]].any()
     assert kept.row.tolist() == (np.flatnonzero(by_hand) + 600).tolist()
 
 

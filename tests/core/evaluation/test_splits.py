@@ -95,6 +95,25 @@ def test_a_cut_in_time_leaves_a_gap_of_the_longest_window(tmp_path_factory, gap)
         assert fold.test.sum() == 0.2 * 200
 
 
+@pytest.mark.parametrize(("n", "outer", "inner"), [(9, 0, 2), (10, 1, 2), (4, 0, 0), (5, 0, 1)])
+def test_a_recording_of_few_rows_is_not_cut(tmp_path, n, outer, inner):
+    data = load_dataset(force_task(), sessions(tmp_path, "a", n))
+    assert len(make_splits(data, "in-session", 0)) == outer
+    every = np.ones(n, dtype=bool)
+    ((_, check),) = inner_splits(data, Assignment("x", every, ~every))
+    assert check.sum() == inner
+
+
+def test_a_window_ends_every_step_rows_and_has_the_label_of_its_last_row(tmp_path):
+    paths = sessions(tmp_path, n=20)
+    rows = load_task(force_task(), paths, "deployable", "session")
+    made = load_task(force_task(), paths, "deployable", "session", window=4, step=3)
+    assert made.X.shape == (18, 4, 3)
+    for place, last in ((0, 3), (1, 6), (5, 18), (6, 23)):
+        np.testing.assert_array_equal(made.X[place], rows.X[last - 3 : last + 1])
+        assert made.y[place] == rows.y[last]
+
+
 @given(
     st.integers(0, 50), st.lists(st.integers(1, 30), min_size=1, max_size=5), st.sampled_from([0.0, 1e8]),
     st.integers(0, 2**32 - 1),
@@ -133,9 +152,9 @@ def test_a_shuffled_split_is_stamped_and_taken_unasked_only_where_nothing_else_f
         choose_split(whole, DEPLOYABLE, load_dataset(whole, one), None)
 
 
-@pytest.mark.parametrize(("label", "folds"), [("unit", 7), ("placement", 7), ("block", 5)])
-def test_units_and_placements_are_left_out_one_by_one_whatever_the_task(tmp_path, label, folds):
-    paths = [record(tmp_path / f"{place}.h5", *ramp(place, n=20), labels={label: place}) for place in range(7)]
+@pytest.mark.parametrize(("label", "n", "folds"), [("unit", 7, 7), ("placement", 12, 12), ("unit", 13, 5), ("x", 7, 5)])
+def test_units_and_placements_are_left_out_one_by_one_whatever_the_task(tmp_path, label, n, folds):
+    paths = [record(tmp_path / f"{place}.h5", *ramp(place, n=20), labels={label: place}) for place in range(n)]
     assert len(make_splits(load_dataset(force_task(), paths), label, 0)) == folds
 
 

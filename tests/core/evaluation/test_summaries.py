@@ -64,6 +64,8 @@ def test_what_the_words_mean():
     assert value(X, "change") == 5.0
     assert value(X, "mean-step") == pytest.approx((2 + 1 + 4) / 3)
     assert value([0.1] * 1000, "deviation") == 0.0  # not its rounding
+    shares = [((0.0, 0.5), 2.0), ((0.25, 0.5), 3.0), ((0.3, 0.31), 3.0), ((0.5, 0.6), 2.0), ((0.99, 1.0), 6.0)]
+    assert [value(X, "mean", start=start, end=end)[0] for (start, end), _ in shares] == [mean for _, mean in shares]
 
 
 def test_a_band_passes_its_own_and_stops_the_others():

@@ -86,6 +86,8 @@ def test_scores_of_replicates_themselves_are_exchanged_too(n):
             n_resamples=9999, rng=0,
         )  # fmt: skip
         assert found.p == pytest.approx(known.pvalue, abs=1e-12 if n == 7 else 0.02)
+        ends = stats.ttest_rel(a + shift, b).confidence_interval(0.95)
+        assert (found.low, found.high) == pytest.approx((ends.low, ends.high), rel=1e-9)
         assert found.smallest_p == (2 / 2**7 if n == 7 else 1 / 10_000)
     assert found.p == found.smallest_p
 

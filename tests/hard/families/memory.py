@@ -17,12 +17,12 @@ def _times(case, tau, *, longest=1e4, repeated=0.2):
 
 
 def lag_over_any_steps(case):
-    """Lag exactly over steps from 1e-6 to 1e4 time constants, and never outside the load's range.
+    """Lag exactly over steps from 1e-6 to 1e12 time constants, and never outside the load's range.
 
     The reference goes one sample after the other in extended precision, from the solution for a straight load.
     """
     tau = case.decades(1e-6, 1e6)
-    t_s = _times(case, tau)
+    t_s = _times(case, tau, longest=10 ** case.uniform(1, 12))
     load = case.rng.uniform(0, 5, t_s.size)
     repeated = np.flatnonzero(np.diff(t_s) == 0) + 1
     for place in repeated:
@@ -40,15 +40,6 @@ def lag_over_any_steps(case):
     apart = float(np.abs(found - np.array(wanted, dtype=np.longdouble)).max())
     # 1 - late/e in doubles at e = 1e-4: 1e-16 / 1e-4, times the load.
     case.holds(apart <= 1e-11, f"a lag is off by {apart:g} of 5 N")
-
-
-def lag_in_equilibrium(case):
-    """Reach a load held for 50 time constants or more to rounding, however long the step."""
-    tau, length = case.decades(1e-6, 1e6), case.decades(50.0, 1e12)
-    before, after = case.uniform(0, 5), case.uniform(0, 5)
-    case.says(tau_s=tau, steps_in_tau=length)
-    found = lag(np.array([0.0, tau, tau * (1 + length)]), np.array([before, after, after]), tau)
-    case.holds(abs(found[-1] - after) <= 1e-14, f"{found[-1]!r}, not {after!r}")
 
 
 def repeated_times(case):
@@ -112,6 +103,5 @@ def drift_over_any_steps(case):
 
 
 FAMILIES = (
-    lag_over_any_steps, lag_in_equilibrium, repeated_times, no_time_constant, clocks_far_from_zero,
-    drift_over_any_steps,
+    lag_over_any_steps, repeated_times, no_time_constant, clocks_far_from_zero, drift_over_any_steps,
 )  # fmt: skip
