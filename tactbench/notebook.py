@@ -413,7 +413,8 @@ def _over_data(
                 stated = {key: value for key, value in own.items() if value is not None}
                 for work in cells_of(called, given, task, mine, Options(**stated)):
                     if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
-                        of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
+                        of = (name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"],
+                              id(stated["split"]), id(stated.get("groups")))  # fmt: skip
                         if of not in splits:
                             splits[of] = work.how["split"]
                             folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}

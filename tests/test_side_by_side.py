@@ -102,6 +102,15 @@ def test_options_may_differ_between_data_sets_and_estimators(data, tmp_path):
     assert rows["soft", "mine"]["fold_sizes"] == rows["soft", "other"]["fold_sizes"]
 
 
+def test_each_estimator_may_have_a_split_of_its_own(data, tmp_path):
+    found = tactbench.run(
+        data={"soft": data["soft"]}, estimators={"mine": Ridge(), "other": Ridge(10.0)}, tasks="force", jobs=1,
+        out=tmp_path, split={"mine": GroupKFold(2), "other": GroupKFold(4)}, groups="session",
+    )  # fmt: skip
+    folds = {row["estimator"]: len(row["fold_sizes"]) for row in found if not row["is_baseline"]}
+    assert folds == {"mine": 2, "other": 4}
+
+
 def test_sensors_of_a_data_set_stand_in_one_table_and_a_failing_object_is_a_row(tmp_path):
     sessions(tmp_path / "in", "abcde", n=40, called="left")
     sessions(tmp_path / "in", "fghij", n=40, called="right")

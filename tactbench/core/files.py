@@ -48,7 +48,10 @@ def hdf5_image(fill: Callable[[Any], None]) -> bytes:
     import h5py
 
     name = uuid.uuid4().hex  # HDF5 takes two files in memory of one name for one
-    with h5py.File(name, "w", driver="core", backing_store=False, libver="earliest") as file:
+    # With the cache, rows may be appended in any number, and each chunk is compressed once.
+    with h5py.File(
+        name, "w", driver="core", backing_store=False, libver="earliest", rdcc_nbytes=2**26, rdcc_w0=1.0
+    ) as file:
         fill(file)
         file.flush()
         image: bytes = file.id.get_file_image()

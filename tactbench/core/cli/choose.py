@@ -11,7 +11,7 @@ from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.formats import json_array
 from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, with_requirements
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import View, grids
+from tactbench.core.leaderboard.view import grids
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.study.results import is_results, opened, shown_rows
 from tactbench.core.study.shipped import shipped_rows
@@ -59,5 +59,5 @@ def command(
     if shape == "json":
         click.echo(json_array(table), nl=False)
     else:
-        show([grid.compact() for grid in grids(table, View(columns=COLUMNS))])
+        show([grid.compact() for grid in grids(table, COLUMNS)])
     remark(f"\nSource: {origin}.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text import csv_text, json_text, visible
 from tactbench.core.tables.text_table import field_text as field_text
 from tactbench.core.tables.text_table import records_table
 
@@ -58,8 +58,6 @@ def print_records(
         For a table: its title; the keys shown as columns (default: all), empty columns left out; and one word for each
         record that selects the style of its line, see `tactbench.core.tables.terminal`.
     """
-    from tactbench.core.tables.csv_text import csv_text
-
     if shape == "json":
         click.echo(json_text(list(records), indent=1))
     elif shape == "csv":

@@ -12,12 +12,13 @@ import click
 from tactbench.core.cli.options import DEFAULT_FOLDER, options
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.files import replace_file
+from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.formats import SUFFIXES, rendered
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import View, document, known_columns
+from tactbench.core.leaderboard.view import ALL, document, known_columns
 from tactbench.core.leaderboard.view import best as best_of
 from tactbench.core.study.results import opened, shown_rows, table_of
-from tactbench.core.tables.terminal import WITHOUT_EDGE, show
+from tactbench.core.tables.terminal import show
 
 TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
 FOR_PEOPLE = ("table", "md", "latex")
@@ -49,10 +50,10 @@ def command(
                          hint=f"Give a file that ends in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
     if columns is not None and shape not in FOR_PEOPLE:
         raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
-    view = View(wide, known_columns(columns.split(",") if columns is not None else ()))
+    names = known_columns(columns.split(",")) if columns is not None else ALL if wide else DEFAULT
     store = opened(folder)
     table = table_of(store, _only(shown_rows(store), filters))
-    print_table(best_of(table, best) if best else table, shape, view, to=to)
+    print_table(best_of(table, best) if best else table, shape, names, to=to)
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
@@ -71,7 +72,7 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
     return kept
 
 
-def print_table(table: Table, shape: str, view: View, *, to: Path | None = None) -> None:
+def print_table(table: Table, shape: str, columns: tuple[str, ...], *, to: Path | None = None) -> None:
     """Print a leaderboard on stdout, or write it to the file `to`.
 
     Parameters
@@ -85,9 +86,9 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
         If the file cannot be written.
     """
     if shape == "table" and to is None and sys.stdout.isatty():
-        show(document(table, view))
+        show(document(table, columns))
         return
-    content = rendered(table, shape, view, WITHOUT_EDGE)
+    content = rendered(table, shape, columns)
     if to is None:
         click.echo(content, nl=False)
         return

@@ -11,9 +11,9 @@ import click
 from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table
 from tactbench.core.cli.listing import remark_failed
 from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
+from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.formats import write_tables
 from tactbench.core.leaderboard.table import over_all
-from tactbench.core.leaderboard.view import DEFAULT_VIEW
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.study.results import table_of
@@ -70,7 +70,7 @@ def command(
     remark_failed(installed())
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **options_given))
     table = table_of(store, over_all(store, outcome.rows))
-    print_table(table, shape, DEFAULT_VIEW)
+    print_table(table, shape, DEFAULT)
     write_tables(table, store.folder)
     count = len(outcome.rows)
     remark(f"\n{count - outcome.computed} of {count} answers were found finished, {outcome.computed} computed now; "

@@ -9,45 +9,46 @@ from typing import Any
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
+from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, SHOWN
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import WHOLE, View, document, grid
+from tactbench.core.leaderboard.view import ALL, document, grid
 from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
 from tactbench.core.tables import terminal
-from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex as latex_of
 from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text import json_text
+from tactbench.core.tables.text import csv_text, json_text
 
 SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table"}
 """Output format by suffix of the file."""
 _IN_A_PAPER = ("place", "sensor", "estimator", "score", "notes", "interval", "range", "against reference", "published")
 
 
-def latex(table: Table, view: View) -> str:
+def latex(table: Table, columns: tuple[str, ...]) -> str:
     """Return the tables as LaTeX, each one column wide, with metric, protocol, split and origin in the caption."""
-    names = view.columns or _IN_A_PAPER
+    names = _IN_A_PAPER if columns in (DEFAULT, ALL) else columns
     grids = []
     for block in table.blocks:
-        shown = grid(block, replace(view, columns=names)).compact()
+        # A column of dashes shows that no answer has a place.
+        keep = ("place",) if any(line.texts["place"] for line in block.lines) else ()
+        shown = grid(block, names).compact(keep)
         grids.append(replace(shown, title=f"{block.title} · {block.setting} · {block.origin}"))
     return latex_of([*grids, *table.sections], wide=False)
 
 
-def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
+def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: int = terminal.WITHOUT_EDGE) -> bytes:
     """Return a leaderboard as the content of a file in the format `shape`, one of the values of `SUFFIXES`.
 
     Parameters
     ----------
-    view, width
+    columns, width
         Columns and width [characters] of formats for people; formats for programs hold all columns.
     """
     if shape == "table":
-        text = terminal.plain_text(document(table, view), width)
+        text = terminal.plain_text(document(table, columns), width)
     elif shape == "md":
-        text = markdown([*document(table, view), *([table.footer] if table.footer else [])])
+        text = markdown([*document(table, columns), *([table.footer] if table.footer else [])])
     elif shape == "latex":
-        text = latex(table, view)
+        text = latex(table, columns)
     else:
         text = csv_of(table) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "backslashreplace")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
@@ -16,25 +16,13 @@ from tactbench.core.tables.text_table import TextTable
 
 CELL, REASON = "cell", "reason"
 """Names of the columns for cell names, and for reasons why cells did not finish."""
+ALL = (*COLUMNS, CELL)
+"""All columns that can be chosen by name."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "training", "published", "delay after touch",
 )  # fmt: skip
 """Columns to leave out on a narrow terminal, in this order; columns selected by name are never left out."""
-
-
-@dataclass(frozen=True)
-class View:
-    """Selection of the leaderboard columns to print."""
-
-    wide: bool = False
-    """True to print all columns."""
-    columns: tuple[str, ...] = ()
-    """Names of the columns to print instead of the default columns; see `known_columns`."""
-
-
-DEFAULT_VIEW = View()
-WHOLE = View(wide=True)
 
 
 def known_columns(names: Sequence[str]) -> tuple[str, ...]:
@@ -45,31 +33,31 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     UnknownNameError
         If a name is not that of a column.
     """
-    known = {name: name for name in (*COLUMNS, CELL)} | {shown: name for name, shown in SHOWN.items()}
+    known = {name: name for name in ALL} | {shown: name for name, shown in SHOWN.items()}
     names = [name.strip() for name in names]
     for name in names:
         if name not in known:
-            raise UnknownNameError("column", name, (*COLUMNS, CELL))
+            raise UnknownNameError("column", name, ALL)
     return tuple(dict.fromkeys(known[name] for name in names))
 
 
-def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
-    """Return the tables to print: one for each block, then events and probes."""
-    return [*grids(table, view), *table.sections]
+def document(table: Table, columns: tuple[str, ...] = DEFAULT) -> list[TextTable]:
+    """Return the tables to print: one for each block, then events."""
+    return [*grids(table, columns), *table.sections]
 
 
-def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
+def grids(table: Table, columns: tuple[str, ...] = DEFAULT) -> list[TextTable]:
     """Return the table to print for each block."""
-    return [grid(block, view) for block in table.blocks]
+    return [grid(block, columns) for block in table.blocks]
 
 
-def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
-    """Return the table to print for a block, with the columns of `view`."""
+def grid(block: Block, columns: tuple[str, ...] = DEFAULT) -> TextTable:
+    """Return the table to print for a block; columns that were chosen by name are printed though they are empty."""
+    chosen = columns not in (DEFAULT, ALL)
     # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if one.kind != "skipped" or not one.row["is_baseline"]] or list(block.lines)
     texts = list(map(_texts, shown))
-    names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
-    names = tuple(name for name in names if name in texts[0])
+    names = tuple(name for name in columns if name in texts[0])
     table = TextTable(
         block.title,
         names,
@@ -80,12 +68,12 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         origin=block.origin,
         summary=(block.setting, *block.verdict),
         notes=block.notes,
-        first_to_go=() if view.columns else _FIRST_TO_GO,
+        first_to_go=() if chosen else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )
     # A column of dashes shows that no answer has a place.
     keep = ("place",) if any(one["place"] for one in texts) else ()
-    return table if view.columns else table.compact(keep)
+    return table if chosen else table.compact(keep)
 
 
 def _texts(line: Line) -> dict[str, str]:

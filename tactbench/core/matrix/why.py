@@ -34,9 +34,14 @@ class StoredCell:
     row: Row
     paths: list[Path]
 
+    @property
+    def missing(self) -> list[Path]:
+        """Paths of the recordings that do not exist."""
+        return [path for path in self.paths if not path.exists()]
+
     def changes(self) -> list[str]:
         """Return sentences with the reasons why a run would not reuse the result: differences, then missing files."""
-        missing = [path for path in self.paths if not path.exists()]
+        missing = self.missing
         try:
             digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
             before = self.store.cell(self.row).sections
@@ -61,6 +66,9 @@ class StoredCell:
             if self.registry.rigs[self.cell.rig].simulated:
                 requests = requests_for([self.cell], self.registry, keys, again)[need]
                 source = RecordingSource([request.path for request in requests], requests)
+            elif self.missing:
+                hint = "Run the matrix again with --rig replay --recordings DIR."
+                raise UsageError(f"The recording {self.missing[0]} does not exist.", hint=hint)
             run = Run(again, self.registry, keys, {need: source}, EngineChoice("in-process"), None, progress)
             run.carry_out([self.cell], timed=True)
             row = run.rows[self.cell.name]

@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tactbench.core.recording.format import Blocks
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, RecordingMeta, StreamClock
 
@@ -150,22 +149,19 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
             j = lowest
 
 
-def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> tuple[RecordingMeta, dict[str, IntArray]]:
+def on_host_clock(meta: RecordingMeta, stamps: dict[str, IntArray]) -> tuple[RecordingMeta, dict[str, IntArray]]:
     """Return `meta` with lines fitted for each stream with a device clock, and the host's times, (n,) [ns], by stream.
 
-    A stream with ``device_ns`` has a device clock unless `meta` states that its times are the host's; also in virtual
-    time, where a device's link and batches delay samples as well.
+    `stamps` are the device's and the host's times, (2, n) [ns], by stream. A stream in it has a device clock unless
+    `meta` states that its times are the host's; also in virtual time, where a device's link and batches delay samples
+    as well.
     """
-    otherwise = StreamClock(source="device")
-    stamps: dict[str, list[IntArray]] = {}
-    for stream, columns in blocks:
-        if "device_ns" in columns and meta.clocks.get(stream, otherwise).source == "device":
-            stamps.setdefault(stream, []).append(np.stack((columns["device_ns"], columns["t_ns"])))
     clocks, times = dict(meta.clocks), {}
-    for stream, some in stamps.items():
-        device_ns, host_ns = np.concatenate(some, axis=1)
-        lines, breaks = fit(device_ns, host_ns), int(np.count_nonzero(np.diff(device_ns) < 0))
-        times[stream] = host_times(lines, device_ns)
-        fitted = {"method": "hull-1way", "segments": lines, "breaks": breaks}
-        clocks[stream] = clocks.get(stream, otherwise).model_copy(update=fitted)
+    for stream, (device_ns, host_ns) in stamps.items():
+        clock = clocks.get(stream, StreamClock(source="device"))
+        if clock.source == "device":
+            lines, breaks = fit(device_ns, host_ns), int(np.count_nonzero(np.diff(device_ns) < 0))
+            times[stream] = host_times(lines, device_ns)
+            fitted = {"method": "hull-1way", "segments": lines, "breaks": breaks}
+            clocks[stream] = clock.model_copy(update=fitted)
     return meta.model_copy(update={"clocks": clocks}), times

@@ -43,7 +43,6 @@ WRONG_UNIT = 50.0
 """Factor between the stated and the measured rate of a stream above which its times are probably in a wrong unit."""
 FINDINGS = "findings"
 """Key in a recording's provenance under which an import stores its findings."""
-FIELDS = ("check", "severity", "message", "stream", "channels")
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
 """Checks whose findings are not shown with scores. Untouched taxels are constant and identical, pressed ones saturate;
 from `dead` on, an evaluation that needs the missing data refuses the recording or reports the fault."""
@@ -177,7 +176,7 @@ def marking(recording: Recording) -> list[Finding]:
     if FINDINGS in meta.provenance:
         with layout.readable(recording.path):
             # Earlier imports stored a count beside these.
-            found = [Finding(*(one[name] for name in FIELDS)) for one in meta.provenance[FINDINGS]]
+            found = [Finding(*(one[name] for name in Finding.__annotations__)) for one in meta.provenance[FINDINGS]]
     else:
         found = [] if meta.simulated and meta.emulation is None else examine(recording)
     return [one for one in found if one.severity != "info" and one.check not in UNMARKED]

@@ -40,7 +40,7 @@ def store(
         Description of the recording; clock fits of devices are added, and the device's times are converted to the
         host's clock.
     blocks
-        Blocks in the order of receipt, iterated three times.
+        Blocks in the order of receipt, iterated twice.
     aside
         Temporary path of the file until it has been read back.
     replace
@@ -72,8 +72,13 @@ def store(
 
     with writable(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-        meta, times = on_host_clock(meta, blocks)
-        flagged = {stream for stream, columns in blocks if "quality" in columns}
+        stamps: dict[str, list[Array]] = {}
+        flagged = set()
+        for stream, columns in blocks:
+            flagged |= {stream} if "quality" in columns else set()
+            if "device_ns" in columns:
+                stamps.setdefault(stream, []).append(np.stack((columns["device_ns"], columns["t_ns"])))
+        meta, times = on_host_clock(meta, {name: np.concatenate(some, axis=1) for name, some in stamps.items()})
         image = hdf5_image(lambda file: _fill(file, meta, _completed(blocks, times, flagged), annotations))
         replace_file(target, image, aside=aside, check=check, sync=sync)
     return meta
@@ -127,17 +132,15 @@ def _completed(blocks: Blocks, times: dict[str, IntArray], flagged: set[str]) ->
 
 
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield larger blocks, of whole chunks except for a stream's last block, so that each chunk is compressed once."""
+    """Yield larger blocks, as each write takes HDF5 some time."""
     waiting: dict[str, list[Columns]] = {}
     rows: Counter[str] = Counter()
     for stream, columns in blocks:
         waiting.setdefault(stream, []).append(columns)
         rows[stream] += len(columns["data"])
         if rows[stream] >= layout.piece_rows(columns["data"].shape[1]):
-            joined, whole = _joined(waiting[stream]), rows[stream] // layout.CHUNK_ROWS * layout.CHUNK_ROWS
-            yield stream, {name: values[:whole] for name, values in joined.items()}
-            waiting[stream] = [{name: values[whole:] for name, values in joined.items()}]
-            rows[stream] -= whole
+            yield stream, _joined(waiting.pop(stream))
+            del rows[stream]
     yield from ((stream, _joined(some)) for stream, some in waiting.items())
 
 

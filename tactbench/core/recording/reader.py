@@ -13,16 +13,12 @@ from pydantic import ValidationError
 from tactbench.core.errors import FormatError, MissingRecordingError, UsageError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.format import Array
-from tactbench.core.samples import IntArray, StreamData
+from tactbench.core.samples import COLUMNS, IntArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
 _NOTE = "annotations/"
-_COLUMNS = {
-    "data": ("iuf", 2), "t_ns": ("i", 1), "quality": ("u", 2), "sequence": ("i", 1), "device_ns": ("i", 1),
-    "host_ns": ("i", 1),
-}  # fmt: skip
-"""Columns of a stream by name, with their permitted kinds of NumPy types and their number of dimensions."""
+_COLUMNS = (*COLUMNS, "host_ns")
 
 
 class LazyStream:
@@ -126,7 +122,7 @@ class Recording:
             )
         if name not in self._opened:
             with layout.readable(self.path):
-                columns = _columns(self.path, self._specs[name], self._streams[name], self)
+                columns = _columns(self.path, self._specs[name], self._streams[name])
             self._opened[name] = LazyStream(self.path, self._specs[name], columns)
         return self._opened[name]
 
@@ -211,24 +207,19 @@ def content_digest(path: Path) -> str:
         return recording.verify()
 
 
-def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> dict[str, Any]:
+def _columns(path: Path, spec: StreamSpec, group: Any) -> dict[str, Any]:
     """Return a stream's HDF5 datasets by path in its group; raises FormatError if the datasets contradict the meta."""
-    import h5py
-
     columns = {name: group[name] for name in _COLUMNS if name in group}
     columns |= {_NOTE + name: item for name, item in group.get("annotations", {}).items()}
-    clock = recording.meta.clock
-    wrong = [] if ("t_ns" in columns) != (clock == "none") else [f"clock {clock!r}, but the columns {[*columns]}"]
-    if "data" not in columns or columns["data"].dtype.newbyteorder("=") != np.dtype(spec.dtype):
-        wrong.append(f"no data of type {spec.dtype}")
-    for name, item in columns.items():
-        text = name.startswith(_NOTE) and h5py.check_string_dtype(item.dtype) is not None
-        kinds, dimensions = _COLUMNS.get(name, ("iu", 1))
-        shape = (group["data"].shape[0] if "data" in columns else 0, len(spec.channels))[:dimensions]
-        if item.shape != shape or not (text or item.dtype.kind in kinds):
-            wrong.append(f"{name} of {item.dtype} and shape {item.shape}, where {shape} is expected")
-    if wrong:
-        raise FormatError(f"In {path}, stream {spec.name!r} has {wrong[0]}.", hint=layout.SEE)
+    rows, *rest = group["data"].shape
+    stored = group["data"].dtype.newbyteorder("=")
+    alike = all(len(one) == rows for one in columns.values())
+    if not alike or (stored, rest) != (np.dtype(spec.dtype), [len(spec.channels)]):
+        raise FormatError(
+            f"In {path}, the data of stream {spec.name!r} are {stored} of shape {(rows, *rest)}, where {spec.dtype} of "
+            f"{len(spec.channels)} channels is expected, or columns differ in length.",
+            hint=layout.SEE,
+        )
     return columns
 
 

@@ -17,7 +17,7 @@ from tactbench.core.errors import UsageError, error_text
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
-from tactbench.core.leaderboard.view import REASON, View, grid
+from tactbench.core.leaderboard.view import REASON, grid
 from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
 from tactbench.core.report.datasheet import sensor_table, table_one
@@ -52,8 +52,7 @@ def answers_section(results: Results) -> Section:
 
 def leaderboards_section(results: Results) -> Section:
     """Return the section of leaderboards, with the reasons of failed and skipped cells, and of tables on events."""
-    view = View(columns=(*DEFAULT, REASON))
-    tables = [replace(grid(block, view), numeric=NUMERIC) for block in results.leaderboard.blocks]
+    tables = [replace(grid(block, (*DEFAULT, REASON)), numeric=NUMERIC) for block in results.leaderboard.blocks]
     tables += results.leaderboard.sections
     return Section(paragraphs=("A number leads to the details of its cell.",),
                    tables=tuple(table.compact() for table in tables))  # fmt: skip

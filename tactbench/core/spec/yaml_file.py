@@ -122,6 +122,6 @@ def _explain(error: ValidationError, file: str, places: Places, model: type[Base
     text = ""
     if isinstance(node, yaml.ScalarNode):  # as it is written: yes, not True, and texts in quotes
         text = repr(node.value) if node.tag == _TEXT else str(node.value)
-    shown = f" (given: {text if len(text) <= 80 else text[:79] + '…'})" if text else ""
+    shown = f" (given: {text[:80]})" if text else ""
     message = first["msg"].removeprefix("Value error, ")
     return ConfigError(file, line, f"{name}: {message}{shown}.", hint="Correct the value.")

@@ -35,17 +35,16 @@ def show(parts: Iterable[Part]) -> None:
     if sys.stdout.isatty():
         _print(parts, Console(highlight=False))
     else:
-        sys.stdout.write(plain_text(parts, WITHOUT_EDGE))
+        sys.stdout.write(plain_text(parts))
 
 
-def plain_text(parts: Iterable[Part], width: int = 240) -> str:
+def plain_text(parts: Iterable[Part], width: int = WITHOUT_EDGE) -> str:
     """Return tables and notes as on a terminal of `width` characters without colours."""
     from rich.console import Console
 
     out = io.StringIO()
-    console = Console(
-        file=out, width=width, color_system=None, force_terminal=False, force_jupyter=False, legacy_windows=False
-    )  # in a notebook it would display the text beside, and write none
+    # In a notebook it would display the text beside, and write none.
+    console = Console(file=out, width=width, color_system=None, force_jupyter=False)
     _print(parts, console)
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().split("\n")[:-1])
 
@@ -67,7 +66,7 @@ def _print_notes(notes: Sequence[str], console: Console) -> None:
     from rich.text import Text
 
     for note in notes:
-        console.print(Padding(Text(note, "dim"), (0, 0, 0, _MARGIN)), highlight=False)
+        console.print(Padding(Text(note, "dim"), (0, 0, 0, _MARGIN)))
 
 
 def _print_table(table: TextTable, console: Console) -> list[str]:
@@ -82,14 +81,14 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
     blank = taken - cell_len(table.title) - cell_len(table.origin)
     origin = (" " * blank if blank > 1 else "\n") + table.origin if table.origin else ""
     sentences = "".join(f"\n{one}" for one in (*table.summary, ""))
-    console.print(Text.assemble((table.title + origin, "bold"), sentences), highlight=False)
+    console.print(Text.assemble((table.title + origin, "bold"), sentences))
     grid = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0), header_style="bold")
     for place, width in widths.items():
         justify: Literal["left", "right"] = "right" if table.right[place] else "left"
         grid.add_column(Text(table.headers[place]), justify=justify, width=width, overflow="fold")
     for line, kind in zip(table.lines, table.kinds or [""] * len(table.lines), strict=True):
         grid.add_row(*(Text(line[place]) for place in widths), style=_STYLE.get(kind, ""))
-    console.print(Padding(grid, (0, 0, 0, _MARGIN)), width=max(taken, console.width), crop=False)
+    console.print(Padding(grid, (0, 0, 0, _MARGIN)))
     if table.notes:
         console.print()
     return [head for place, head in enumerate(table.headers) if place not in widths]

@@ -1,10 +1,13 @@
-"""Escaping of control characters in texts from plugins and recordings, so that these can be printed."""
+"""Texts from plugins and recordings in a form that can be printed, as JSON, and as CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import shlex
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -55,3 +58,14 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(one) for one in value]
     return value
+
+
+def csv_text(names: Iterable[str], lines: Iterable[Iterable[Any]]) -> str:
+    """Return lines as CSV text with a header of `names`; lists and mappings in a field become JSON."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(
+        [json_text(value) if isinstance(value, list | tuple | dict) else value for value in line] for line in lines
+    )
+    return out.getvalue()

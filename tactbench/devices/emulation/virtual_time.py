@@ -64,6 +64,11 @@ class VirtualTime:
         """Return the virtual time [ns]."""
         return round(self.now_s * 1e9)
 
+    def advance(self, until_ns: int) -> None:
+        """Advance all devices up to and including `until_ns`; a past time changes nothing."""
+        while self.step(until_ns * 1e-9):
+            pass
+
     def step(self, until_s: float) -> bool:
         """Advance to the next event of a device and carry it out, or to `until_s` if that is earlier.
 
@@ -109,9 +114,8 @@ class EmulatedDevices:
         """Do nothing: the devices hold nothing of the operating system."""
 
     def advance(self, until_ns: int) -> None:
-        """Advance all devices up to and including a time of `clock`; a past time changes nothing."""
-        while self.clock.step(until_ns * 1e-9):
-            pass
+        """Advance all devices as :meth:`VirtualTime.advance` does."""
+        self.clock.advance(until_ns)
 
     def open_link(self, name: str) -> Link:
         """Open the host's end of a device's link; raises LinkError if it is open already."""

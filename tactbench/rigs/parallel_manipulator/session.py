@@ -104,13 +104,13 @@ class Session:
         if self.emulated is not None:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
             return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
-        devices = {
-            name: DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
-            for name, entry in {**self._file.devices, FORCE: self._file.force}.items()
-            if entry is not None
-        }
+
+        def device(entry: Any) -> DeviceSettings:
+            return DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+
+        of_axes = {name: device(self._file.devices[name]) for name in names}
         log = str(Path(self.settings.guard_log).expanduser().resolve())
-        return GuardProcess(ProcessSettings({name: devices[name] for name in names}, devices[FORCE], log))
+        return GuardProcess(ProcessSettings(of_axes, device(self._file.force), log))
 
     # The beginning of a scene -----------------------------------------------------------------------------------------
 

@@ -6,7 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-from tactbench.core.cost.precision import precise
+from tactbench.core.cost.precision import Skipped, diagrams, precise
+from tactbench.core.cost.precision import measured as measured_twin
+from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.plugins.interfaces import CostJob, CostStudy
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.figures.style import styled
@@ -120,8 +123,26 @@ def test_settings_are_the_defaults_and_values_on_either_side(registry):
     }  # fmt: skip
 
 
-def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
-    assert quick_estimator(registry, "force") == "ols"
+def test_the_quick_estimator_is_linear_and_searches_nothing(registry, monkeypatch):
+    assert [quick_estimator(registry, task) for task in ("force", "slip")] == ["ols", "slip-spectrum"]
+    monkeypatch.setattr(registry, "tasks", {"own": registry.tasks["force"]})
+    spec = registry.tasks["own"].spec.model_copy(update={"estimators": ()})
+    registry.tasks["own"] = registry.tasks["own"].model_copy(update={"spec": spec})
+    assert registry.estimators[quick_estimator(registry, "own")].linear
+    registry.tasks["own"] = registry.tasks["own"].model_copy(update={"spec": spec.model_copy(update={"kind": "none"})})
+    with pytest.raises(UsageError, match="own"):
+        quick_estimator(registry, "own")
+
+
+def test_a_measurement_that_is_not_possible_is_a_line_and_points_are_in_order_of_time():
+    def refuses():
+        raise NotApplicable("no film", hint="")
+
+    points = [cost_point(2.0, 0.1), cost_point(1.0, 0.2), cost_point(1.0, 0.5, subject="dome")]
+    jobs = [CostJob("a", lambda: points), CostJob("b", refuses)]
+    found = list(measured_twin(CostStudy("t", "r", jobs), "pad", Progress()))
+    assert found == [*points, Skipped("pad", "b", "no film")]
+    assert diagrams(points) == {("pad", "taxel"): points[1::-1], ("dome", "taxel"): points[2:]}
 
 
 def cost_point(seconds, error, *, subject="pad"):

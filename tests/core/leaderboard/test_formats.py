@@ -9,10 +9,10 @@ import pytest
 from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
+from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, SHOWN
 from tactbench.core.leaderboard.formats import rendered, write_tables
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
+from tactbench.core.leaderboard.view import ALL, grids
 from tactbench.core.tables.latex import tex
 
 from .rows import hostile_rows, row
@@ -35,7 +35,13 @@ def test_json_and_csv_hold_the_cells_of_the_table():
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
 
 
-@pytest.mark.parametrize("view", [DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))])
+def test_latex_has_a_column_of_dashes_where_no_answer_is_better_than_the_trivial_one():
+    rows = [row(score=2.0), row(estimator="mean", is_baseline=True)]
+    lines = written("latex", rows).decode().splitlines()
+    assert [line.split(" & ")[0] for line in lines if " & " in line] == ["place", "--", ""]
+
+
+@pytest.mark.parametrize("view", [DEFAULT, ALL, ("estimator", "score", "cell")])
 def test_markdown_shows_the_cells_of_the_table_as_text(view):
     table = build_table(hostile_rows())
     cells, place = [], None

@@ -30,7 +30,10 @@ def test_two_sensors_are_compared_estimator_by_estimator():
     assert all(one.difference.verdict == "better" and one.difference.paired for one in found)
     (table,) = tables_of(found)
     assert table.title.split(" · ")[1:4] == ["question", "RMSE [N]", "deployable"]
-    assert table.lines[0][-1] == "a better"
+    assert table.lines[0] == (
+        "lasso", "1.2616", "1.5680", "−0.3064", "−0.3301 … −0.2827", "0.031", "0.062", "6", "a better",
+    )  # fmt: skip
+    assert [entry.value for entry in table.lines[0][1:3]] == [rows[0]["score"], rows[1]["score"]]
     (record, _) = map(record_of, found)
     assert record["difference"] == pytest.approx(record["score_a"] - record["score_b"])
 

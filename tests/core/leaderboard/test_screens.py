@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW
 from tactbench.core.statistics.replicates import over_replicates
 
 from .rows import row
@@ -62,7 +62,7 @@ FILES = {f"{width}.txt": ("table", width) for width in (80, 100, 140)} | {"table
 
 def shown(name):
     shape, *width = FILES[name]
-    return rendered(table(), shape, DEFAULT_VIEW, *width).decode()
+    return rendered(table(), shape, DEFAULT, *width).decode()
 
 
 @pytest.mark.parametrize("name", FILES)

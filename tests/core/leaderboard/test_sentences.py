@@ -165,9 +165,13 @@ class Truth:
         named = names.split(", ") if names else stamped
         return set(stamped).issuperset(named) and len(stamped) == len(named) + int(more or 0)
 
-    def ended(self, status, others, reason):
+    def ended(self, names, more, status, others, reason):
         family = [one for one in self.stopped if one["status"] == status]
-        return len([one for one in family if one["reason"] != reason]) == others < len(family)
+        named = min(4, len(family) - others)
+        return len([one for one in family if one["reason"] != reason]) == others < len(family) and (
+            len(names.split(", ")),
+            int(more or 0),
+        ) == (named, len(family) - others - named)
 
     def counts(self, text, rows):
         numbers = [int(one) for one in re.findall(r"\d+", text)]
@@ -209,8 +213,8 @@ BELOW = {
         lambda t, pairs, targets, one: (pairs == "paired") == t.shared() and bool(targets) == t.targets_differ()
         and bool(one) == ({o["n_specimens"] for o in t.better} == {1}),
     r"Times cannot be compared: they were taken on 2 hosts\.": lambda t: len({o["host"] for o in t.answers}) == 2,
-    r"a/x.*?(?: and \d+ more)? (failed|skipped)(?:; (\d+) more ended otherwise)?: (\w+\.)":
-        lambda t, status, others, reason: t.ended(status, int(others or 0), reason),
+    r"(a/x.*?)(?: and (\d+) more)? (failed|skipped)(?:; (\d+) more ended otherwise)?: (\w+\.)":
+        lambda t, names, more, status, others, reason: t.ended(names, more, status, int(others or 0), reason),
 }  # fmt: skip
 
 

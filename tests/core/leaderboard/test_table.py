@@ -1,5 +1,6 @@
 """What stands together, in what order, in which columns."""
 
+import json
 import random
 
 import pytest
@@ -16,7 +17,7 @@ from tactbench.core.leaderboard.names import (
     split_name,
 )
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import View, best, grids, known_columns
+from tactbench.core.leaderboard.view import ALL, best, grids, known_columns
 from tactbench.core.tables.text_table import Entry
 
 from .rows import hostile_rows, row
@@ -46,6 +47,10 @@ def test_the_best_stands_first_and_equal_scores_share_a_place(scores, more, foun
     for order in (rows, rows[::-1]):
         (block,) = build_table(order).blocks
         assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == found
+        for one, (place, _) in zip(json.loads(rendered(build_table(order), "json")), found, strict=True):
+            assert (one["shown"]["rank"], str(one["rank"] or "")) == (place, place.rstrip("="))
+            assert one["rank_tied"] == (place.endswith("=") if place else None)
+            assert not place or (one["rank_low"], one["rank_high"]) == ((1, 2) if place == "1=" else (one["rank"],) * 2)
 
 
 @pytest.mark.parametrize(("spread", "mark"), [((0.2,) * 6, ""), ((-0.2, 0.4, -0.1, 0.4, -0.2, 0.4), "*")])
@@ -86,9 +91,9 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
 def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row()]))
     assert grid.columns == ("place", "sensor", "estimator", "score", "interval", "training")
-    (grid,) = grids(build_table([row(**FLOOR)]), View(wide=True))
+    (grid,) = grids(build_table([row(**FLOOR)]), ALL)
     assert {"beyond floor", "test samples", "latency p50", "cell"} <= set(grid.columns)
-    (grid,) = grids(build_table([row(cell="a/b")]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
+    (grid,) = grids(build_table([row(cell="a/b")]), known_columns(["cell", "score", "rank", "cell"]))
     assert grid.lines == (("a/b", "0.5000", "1"),)
     with pytest.raises(UnknownNameError, match=r"'score'.*cell"):
         known_columns(["scor"])

@@ -103,6 +103,7 @@ def test_a_plugin_may_bring_every_kind_of_thing(site):
     (row,) = registry.plugins
     assert (row.status, row.reason, row.distribution, row.version) == ("loaded", "", "every-thing", "2.1")
     assert len(row.brings) == 8
+    assert {"sensor pad", "profile tap"} <= {*row.brings}
     names = {kind: family.names() for kind, family in registry.families().items()}
     assert names == {
         "sensors": ["pad"], "rigs": ["press"], "devices": ["pad", "scale"], "tasks": ["push"],

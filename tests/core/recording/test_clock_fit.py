@@ -89,3 +89,28 @@ def test_a_clock_in_another_unit_or_of_another_rate_is_named(per_second, wrong):
     (line,) = fit(device, host)
     assert bool(wrong_rate("taxels", line.drift, int(host[-1]))) == wrong
     assert not wrong_rate("taxels", line.drift, MS)
+
+
+@pytest.mark.parametrize(
+    ("drift", "lasts_ns", "wrong"),
+    [
+        (0.01, 10**12, False),
+        (-0.0101, 10**12, True),
+        (0.02, 5 * S - 1, False),
+        (0.02, 5 * S, True),
+        (2.0, 10**8 - 1, False),
+        (2.0, 10**8, True),
+    ],
+)
+def test_a_rate_is_wrong_beyond_a_percent_and_what_late_stamps_explain(drift, lasts_ns, wrong):
+    assert bool(wrong_rate("taxels", drift, lasts_ns)) == wrong
+
+
+def test_the_bound_is_the_widest_of_six_windows_and_the_largest_step_between_them():
+    """Delays of 0 to 9 ms in each window, of 2 to 11 ms in the second: 9 ms, and a step of 2 ms."""
+    delay = np.tile(np.arange(10)[::-1], 6) * MS
+    delay[10:20] += 2 * MS
+    device = np.arange(60) * S // 10
+    line = one_way(0, (device, device + delay))
+    assert (line.offset_ns, line.drift, line.bound_ns) == (0, 0.0, 11 * MS)
+    assert one_way(0, (device[1:], device[1:] + delay[1:])).bound_ns is None

@@ -51,6 +51,7 @@ def test_a_whole_recording_lacks_nothing():
 def test_silence_is_missing(keep, span):
     assert lacking(keep=keep) == [("force", "silent", *span)]
     assert lacking(keep=keep, silent_s=7.5) == []
+    assert lacking(keep=keep, silent_s=span[0]) == []
 
 
 def test_rows_without_a_number_or_marked_missing_are_silence():
@@ -63,6 +64,11 @@ def test_rows_without_a_number_or_marked_missing_are_silence():
 def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_meanwhile():
     stuck = lambda t_s: np.where(t_s < 4.0, t_s, 4.0)[:, None]  # noqa: E731
     assert lacking(force=stuck) == [("force", "frozen", 5.99, 4)]
+    assert lacking(force=stuck, frozen_s=5.99) == []
+    held = lambda t_s: np.minimum(t_s, 6.0)[:, None].repeat(2, 1)  # noqa: E731
+    for slope, found in ((0.3, []), (0.5, [("taxels", "frozen", 3.99, 6)])):  # of 16 and 25 % of the force
+        slower = lambda t_s, slope=slope: np.where(t_s < 6, t_s, 6 + slope * (t_s - 6))[:, None]  # noqa: E731
+        assert lacking(taxels=held, force=slower) == found
     still = lambda t_s: np.full((len(t_s), 2), 7.0)  # noqa: E731
     assert lacking(taxels=still) == [("taxels", "frozen", 9.99, 0)]
     # A second stream of the sensor that changes shows that the sensor lives, whatever the first one does.

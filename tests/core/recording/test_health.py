@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from tactbench.core.recording.health import examine
-from tactbench.core.recording.reader import open_recording
-from tactbench.core.samples import Quality
+from tactbench.core.recording.health import examine, is_copy, listed
+from tactbench.core.recording.reader import UnwrittenRecording, open_recording
+from tactbench.core.samples import Quality, StreamData
 from tactbench.core.spec.recording import ClockSegment, StreamClock, StreamCounts
 from tests.core.evaluation.made import FORCE
+from tests.core.recording.conftest import about
 
 N = 200
 READINGS = np.random.default_rng(0).integers(100, 4000, (N, 3))
@@ -81,3 +82,56 @@ def test_what_is_wrong_is_the_one_thing_that_is_told(write, made, expected):
     assert all(says in findings[check].message for check, says in expected.items())
     errors = {check for check, finding in findings.items() if finding.severity == "error"}
     assert errors == expected.keys() & {"backward", "clock-rate", "dead"}
+
+
+def checks(hz, stated, gap_ns=0):
+    """Return the findings about the clock of a stream of 201 rows, with a gap before the last row."""
+    meta = about(reference=())
+    spec = meta.sensor.streams[0].model_copy(update={"rate_hz": stated})
+    meta = meta.model_copy(update={"sensor": meta.sensor.model_copy(update={"streams": (spec,)})})
+    times = np.round(np.arange(N + 1) * 1e9 / hz).astype(np.int64)
+    times[-1] += gap_ns
+    rows = StreamData(spec, times, np.vstack((READINGS, READINGS[:1])), None)
+    return {one.check: one.message for one in examine(UnwrittenRecording(meta, [rows]))}
+
+
+@pytest.mark.parametrize(
+    ("hz", "stated", "found", "suspected"),
+    [
+        (95.1, 100, False, ""), (94.9, 100, True, ""), (104.9, 100, False, ""), (105.1, 100, True, ""),
+        (2.1, 100, True, ""), (1.9, 100, True, "ms read as s"),
+        (4900, 100, True, ""), (5100, 100, True, "s read as ms"),
+        (1.1, None, False, ""), (0.9, None, True, "ms read as s"), (1e6, None, False, ""),
+    ],
+)  # fmt: skip
+def test_a_rate_is_reported_beyond_five_percent_and_a_unit_suspected_beyond_a_factor(hz, stated, found, suspected):
+    told = checks(hz, stated)
+    assert told.keys() == {"rate"} & {"rate" * found}
+    assert suspected in told.get("rate", "")
+    assert ("read as" in told.get("rate", "")) == bool(suspected)
+
+
+@pytest.mark.parametrize(("gap_ns", "found"), [(40_000_000, False), (40_000_001, True)])
+def test_a_gap_is_longer_than_five_steps(gap_ns, found):
+    assert ("gaps" in checks(100, None, gap_ns)) == found
+
+
+def test_up_to_six_names_are_listed():
+    assert listed("a") == "a"
+    assert listed("abcdef") == "a, b, c, d, e and f"
+    assert listed("abcdefg") == "a, b, c … (7 channels)"
+
+
+@pytest.mark.parametrize(
+    ("values", "late", "copied"),
+    [(200, 5, True), (200, -5, True), (200, 6, False), (200, -6, False), (199, 5, False), (199, 0, False)],
+)
+def test_a_copy_is_monotone_and_at_most_five_rows_late(values, late, copied):
+    one = np.random.default_rng(0).permutation(np.arange(3000) % values) ** 3.0
+    other = np.roll(-np.cbrt(one), late)
+    assert is_copy(one, other) == copied
+    assert is_copy(one, 3 * one + 1)
+    assert not is_copy(one, np.zeros(3000))
+    assert not is_copy(one, other, np.arange(3000))  # no two rows of one recording
+    other[1500:1510] = np.random.default_rng(1).permutation(other[1500:1510])
+    assert not is_copy(one, other)

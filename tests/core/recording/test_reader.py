@@ -50,9 +50,12 @@ def test_cut_short_anywhere(good):
             read_all(good)
 
 
-def _wider(file):
-    del file["streams/taxels/data"]
-    file["streams/taxels/data"] = np.zeros((3000, 4), dtype=np.uint16)
+def _other(data):
+    def tamper(file):
+        del file["streams/taxels/data"]
+        file["streams/taxels/data"] = data
+
+    return tamper
 
 
 def _one_reading(file):
@@ -64,8 +67,12 @@ def _one_reading(file):
     [
         (lambda file: file.attrs.update({"format_version": 5}), "newer tactbench"),
         (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
-        (lambda file: file.pop("streams/taxels/data"), "uint16"),
-        (_wider, r"\(3000, 3\)"),
+        (lambda file: file.pop("streams/taxels/data"), "data"),
+        (lambda file: file.move("streams/force_torque/t_ns", "streams/taxels/host_ns"), "digest"),
+        (_other(np.zeros((3000, 4), np.uint16)), r"\(3000, 4\)"),
+        (_other(np.zeros((2999, 3), np.uint16)), r"\(2999, 3\)"),
+        (_other(np.zeros(3000, np.uint16)), r"\(3000,\)"),
+        (_other(np.zeros((3000, 3), np.int16)), "int16 of"),
         (_one_reading, "digest"),
     ],
 )

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tactbench.core.recording.format import canonical
+from tactbench.core.recording.format import canonical, piece_rows
 from tactbench.core.recording.reader import content_digest, open_recording, read_meta
 from tactbench.core.recording.writer import RecordingWriter, write_recording
 from tactbench.core.samples import Block
@@ -96,3 +96,9 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
         assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
         assert taxels["channel"].asstr()[:].tolist() == ["t0", "t1", "t2"]
+
+
+def test_pieces_are_of_some_two_million_values_in_whole_chunks():
+    assert [piece_rows(channels) for channels in (1, 128, 129, 256, 2048, 4096)] == [
+        16384, 16384, 15360, 8192, 1024, 1024,
+    ]  # fmt: skip

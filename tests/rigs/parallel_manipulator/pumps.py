@@ -13,9 +13,9 @@ class VirtualLink(VirtualByteLink, VirtualDatagramLink):
     """An emulator behind a link whose waits move a virtual clock."""
 
     def __init__(self, emulator, *, begin_s=100.0):
-        self.emulator, self.clock, self.line = emulator, VirtualTime(), Line(emulator)
+        self.emulator, self.line = emulator, Line(emulator)
+        self.clock = VirtualTime([self.line])
         self.clock.now_s = begin_s
-        self.clock.lines.append(self.line)
         super().__init__("device", self.clock, self.line)
 
     @property

@@ -94,12 +94,8 @@ class Arrays(Frozen):
 
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
-        if (self.format == "npy") == bool(self.array):
-            raise ValueError("array must name an array of an npz or mat file, and is not allowed for an npy file")
         if max(self.axes.count("recording"), self.axes.count("row")) > 1:
             raise ValueError("axes name recording or row twice; only channel may occur several times")
-        if self.per_recording and "recording" not in self.axes:
-            raise ValueError("per_recording needs an axis called recording")
         return self
 
 

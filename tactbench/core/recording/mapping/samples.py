@@ -45,10 +45,9 @@ def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[
     MappingError
         If a column is missing, a cell is no number, a channel has no sample at all, or a label is not known.
     """
-    numbers = np.column_stack([table.numbers(channel.column) for channel in stream.channels])
-    given = [np.where(np.isin(column, channel.group.sentinels or ()), np.nan, column)
-             for column, channel in zip(numbers.T, stream.channels, strict=True)]  # fmt: skip
-    stored = np.column_stack(given)
+    stored = np.column_stack([table.numbers(channel.column) for channel in stream.channels])
+    for column, channel in zip(stored.T, stream.channels, strict=True):
+        column[np.isin(column, channel.group.sentinels or ())] = np.nan
     absent = np.isnan(stored)
     for place in np.flatnonzero(absent.all(axis=0)):
         channel = stream.channels[place]

@@ -154,6 +154,7 @@ def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
     np.savez(tables.data / "x.npz", X=np.array([0, "a"], dtype=object))
     read_as = {"format": "npz", "array": "X", "axes": ["row"]}
     tables.refused("x.npz", "allow_pickle", tables__table__files="x.npz", tables__table__read=read_as)
+    tables.refused("x.npz", "Its arrays: X", tables__table__files="x.npz", tables__table__read=read_as | {"array": "x"})
 
 
 def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
@@ -385,12 +386,9 @@ def test_what_does_not_fit_is_refused_with_its_place(tables, text, change, says)
         ({"streams__taxels__annotations": {"a": {}}}, "rows_per"),
         ({"streams__taxels__annotations": {"a": {"column": 1, "rows_per": 2}}}, "rows_per"),
         ({"streams__taxels__rate_hz": 100}, "rate_source"),
-        ({"tables__table__read": {"format": "csv", "header": False, "decimal": ",", "thousands": ","}}, "thousands"),
-        ({"tables__table__read": {"format": "npz", "axes": ["row"]}}, "array"),
-        ({"tables__table__read": {"format": "npy", "axes": ["row"], "array": "x"}}, "array"),
+        ({"tables__table__read": {"format": "csv", "header": False, "thousands": "."}}, "thousands"),
         ({"tables__table__read": {"format": "npy", "axes": ["row", "row"]}}, "axes"),
         ({"tables__table__read": {"format": "npy", "axes": ["recording", "recording"]}}, "axes"),
-        ({"tables__table__read": {"format": "npy", "axes": ["row"], "per_recording": {"y": "y"}}}, "per_recording"),
         ({"tables__table__time__unit": "mm"}, "unit"),
         ({"tables__table__path": "("}, "path"),
         ({"streams__force__channels__0__unit": "count"}, "unit"),
