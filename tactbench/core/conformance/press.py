@@ -220,6 +220,8 @@ def it_is_applied(subject: Subject) -> None:
     for sensor in sensors:
         with suppress(CheckSkipped):
             _, found = press(sensor, "+")
+            if any(np.isnan(one).any() for one in found["readings"]):  # a converter makes numbers of them
+                fail("where", "after the effect, a reading is NaN and not marked as MISSING")
             changed = ["readings"]  # where the rig cannot do without it, or it does something else
             if READINGS.issuperset(subject.descriptor.produces):
                 with suppress(CheckFailed, CheckSkipped):

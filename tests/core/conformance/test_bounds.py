@@ -1,5 +1,6 @@
 """What the checks compare, at the bounds: times, rates, limits, units, and the data that estimators and sensors get."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -198,6 +199,24 @@ def test_places_of_a_spec(channel, at_fault):
     except CheckSkipped:
         found = "skipped"
     assert found == at_fault
+
+
+SHEET = ICUB.skin.sheet
+RIGHT_M, HALF_M = SHEET.x_max.to("m"), SHEET.arc.to("m") / 2
+
+
+@pytest.mark.parametrize(
+    ("x_m", "s_m", "at_fault"),
+    [(RIGHT_M, 0.0, ""), (RIGHT_M + 1e-5, 0.0, "position_m"), (SHEET.x_min.to("m"), 0.0, ""),
+     (SHEET.x_min.to("m") - 1e-5, 0.0, "position_m"), (0.0, HALF_M, ""), (0.0, -HALF_M - 1e-5, "position_m")],
+)  # fmt: skip
+def test_taxels_lie_on_the_sheet_its_edges_included(x_m, s_m, at_fault):
+    radius_m = SHEET.outer_radius.to("m")
+    place_m = x_m, radius_m * math.sin(s_m / radius_m), -radius_m * math.cos(s_m / radius_m)
+    first, *others = TAXELS.channels
+    moved = first.model_copy(update={"position_m": place_m, "site": None})
+    streams = (TAXELS.model_copy(update={"channels": (moved, *others)}),)
+    assert found_in(sensor.places_are_on_the_skin, streams=streams) == at_fault
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from tests.core.conformance.makers import FOUND_BY, SILENT, SOUND, planted, said
 from tests.core.conformance.makers import MISTAKES as ALTERED
 from tests.core.conformance.test_mistakes import KIND, MISTAKES, SHELF, written
 
+pytestmark = pytest.mark.filterwarnings("ignore")  # `check` makes no errors of warnings
+
 
 @pytest.fixture(scope="module")
 def flawed(tmp_path_factory):

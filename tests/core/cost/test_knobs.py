@@ -93,6 +93,8 @@ def test_the_figure_has_a_path_for_each_knob_and_a_panel_for_each_sensor(known):
     with styled():
         drawn = draw_trade(known)
         panels = draw_precision([cost_point(t, 1 / t, subject=name) for name in "ab" for t in (1, 2)], "Two").axes
+    assert drawn.axes[0].xaxis.get_major_formatter()(20.0) == "20"
+    assert [panels[0].yaxis.get_minor_formatter()(one) for one in (0.5, 0.3)] == ["0.5", ""]
     paths = {line.get_label(): line for axes in drawn.axes for line in axes.get_lines()}
     for knob in ("trees", "window k", "every n-th sample"):
         own = [one for one in known["settings"] if one["knob"] == knob]

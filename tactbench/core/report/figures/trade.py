@@ -35,7 +35,7 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
     """
     shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
     times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
-    figure, axes = panels(1, len(times), wide=True, sharey=True)
+    figure, axes = panels(1, len(times), wide=len(times) > 1, sharey=True)
     for here, time in zip(axes[0], times, strict=True):
         own = [one for one in shown if TIMES[one["knob"]] == time]
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
@@ -48,6 +48,7 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
         if known["trivial"] is not None:
             here.axhline(known["trivial"], color="grey", ls="--", label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
+        _plain_numbers(here.xaxis)
     axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
@@ -68,16 +69,24 @@ def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
     The dashed line is a third of the observable's noise.
     """
     found = diagrams(points)
-    figure, axes = panels(1, len(found), wide=True)
+    figure, axes = panels(1, len(found), wide=len(found) > 1)
     for here, ((subject, observable), group) in zip(axes[0], found.items(), strict=True):
         _draw_points(here, [(one.seconds, one.error, one.label) for one in group], 0, line="")
         if math.isfinite(group[0].floor):
             here.axhline(SHARE * group[0].floor, color="black", ls="--", label="a third of the noise")
         here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
                  ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
+        _plain_numbers(here.xaxis)
+        _plain_numbers(here.yaxis)
     figure.suptitle(title)
     legend(figure, axes.flat)
     return figure
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers of ten."""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
 
 
 def _draw_points(
