@@ -122,11 +122,6 @@ def outer_radius_mm(sheet: SkinSheet) -> float:
     return math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
 
 
-def radius_mm(indenter: Indenter) -> float:
-    """Return the radius [mm] of a spherical cap; infinity for a flat surface and any other shape."""
-    return math.inf if indenter.radius is None else indenter.radius.to("mm")
-
-
 def gap_mm(grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None) -> FloatArray:
     """Return the (nx, ns) gap between unloaded skin and indenter at zero approach; a skin without a sheet is flat.
 

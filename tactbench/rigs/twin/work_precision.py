@@ -24,9 +24,9 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
-from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.synthesis import RUNGS
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)
 """Radii of the indenters: caps from the sharpest to the bluntest, and the flat surface of the force task."""

@@ -118,17 +118,13 @@ def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
     x, y, z = np.array(places, dtype=np.float64).T
     round_finger = spec.skin is not None and spec.skin.sheet.outer_radius is not None
     across = np.arctan2(y, -z) if round_finger else y
-    u, v = (_scaled(one) for one in (x, across))
+    # Within -1 to 1, so that squares of metres are not lost; 0 if all are equal.
+    u, v = (one - (one.max() + one.min()) / 2 for one in (x, across))
+    u, v = (one / (np.abs(one).max() or 1.0) for one in (u, v))
     columns = np.stack([u, v, u * u, u * v, v * v], axis=1)
     columns -= columns.mean(axis=0)
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
     return left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)]
-
-
-def _scaled(values: FloatArray) -> FloatArray:
-    """Return values shifted and scaled to within -1 to 1, so that squares of metres are not lost; 0 if all equal."""
-    about = values - (values.max() + values.min()) / 2
-    return np.asarray(about / (np.abs(about).max() or 1.0))
 
 
 def warm_up(run: Synthesis) -> None:
