@@ -7,6 +7,7 @@ change of the readings if the effect is left out.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from tactbench.plugin import ChannelKind, Quantity, Scene, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
@@ -257,17 +258,7 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 # Heat.
 
 
-def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Decide whether the scene includes steady temperature: a thermistor in the spec gives an observed channel."""
-    return _thermistor(scene, sensor, "dc_temperature", THERMISTOR)
-
-
-def ac_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Decide whether the scene includes changing temperature: a thermistor in the spec gives an observed channel."""
-    return _thermistor(scene, sensor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
-
-
-def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tuple[str, ...]) -> Reason:
+def _thermistor(kind: ChannelKind, needed: tuple[str, ...], scene: Scene, sensor: SensorSpec) -> Reason:
     if kind not in scene.observe:
         return _no(NOT_OBSERVED)
     missing = [name for name in (*needed, *NEEDED) if name not in sensor.parameters]
@@ -275,6 +266,12 @@ def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tup
         return _no(f"the spec states no {', '.join(missing)}")
     rise = sensor.parameters["heater_power"].to("W") * sensor.parameters["heat_resistance"].to("K/W")
     return Reason(True, f"an observed channel reads a core that its heater keeps {rise:.0f} K above the room")
+
+
+dc_temperature = partial(_thermistor, "dc_temperature", THERMISTOR)
+"""Function that decides whether the scene includes steady temperature: a thermistor gives an observed channel."""
+ac_temperature = partial(_thermistor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
+"""Function that decides whether the scene includes changing temperature: a thermistor gives an observed channel."""
 
 
 def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -196,5 +196,5 @@ class Thermistor:
     def reading(self, degc: FloatArray) -> FloatArray:
         """Return the readings [count] at temperatures [degC]: full scale times ``p / (exp(b/T) + q)``, T in kelvin."""
         # Above absolute zero by a kelvin: colder than that, the exponential overflows.
-        kelvin = np.maximum(np.asarray(degc, dtype=np.float64) + _ICE_K, 10.0)
+        kelvin = np.maximum(degc + _ICE_K, 10.0)
         return self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q)
