@@ -87,7 +87,7 @@ def shear(scene: Scene, sensor: SensorSpec) -> Reason:
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
         return _no("no observed channel responds to tangential motion of the skin")
-    slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
+    slides = "; the slide drags it" if _slides(scene).called_for else ""
     return _under_load(scene, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
 
 
@@ -212,7 +212,7 @@ def force_filter(scene: Scene, sensor: SensorSpec) -> Reason:
 # Sliding.
 
 
-def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
+def _slides(scene: Scene) -> Reason:
     slide = scene.slide
     if slide is None:
         return _no("no tangential motion: the scene does not slide")
@@ -224,7 +224,7 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def friction(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes friction: a loaded surface moves over the skin."""
-    found = _slides(scene, sensor)
+    found = _slides(scene)
     if scene.slide is None or not found.called_for:
         return found
     surface = scene.slide.surface
@@ -235,7 +235,7 @@ def friction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes a vibration of the skin under a sliding rough surface."""
-    found = _slides(scene, sensor)
+    found = _slides(scene)
     if not found.called_for or scene.slide is None:
         return found
     surface = scene.slide.surface

@@ -109,12 +109,9 @@ class Dragged:
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
         return drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness
 
-    def _add(self, t_s: float, kind: int, x_mm: float, about_mm: float = 0.0, friction: float = 0.0) -> None:
-        self._phases.append((t_s, kind, x_mm, about_mm, friction))
-
     def _run(self) -> None:
         drive = self.drive
-        self._add(-math.inf, REST, 0.0)
+        self._phases.append((-math.inf, REST, 0.0, 0.0, 0.0))
         end = min(drive.end_s, float(drive.t_s[-1]))
         t, x, since = drive.start_s, 0.0, 0.0
         sliding = bool(np.interp(t, drive.t_s, drive.load_n) <= _LEAST_LOAD_N)
@@ -124,7 +121,7 @@ class Dragged:
                 sliding, since = False, x
                 continue
             since = x
-            self._add(t, STICK, x)
+            self._phases.append((t, STICK, x, 0.0, 0.0))
             t, x = self._lets_go(t, x, end)
             if t >= end:
                 break
@@ -133,7 +130,7 @@ class Dragged:
             sliding = math.isinf(lasting)
             if sliding:
                 lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
-            self._add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
+            self._phases.append((t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic))))
             lasting = min(lasting, end - t)
             u, _ = swing(drive.mode, x - about, drive.speed_mm_s, lasting)
             # A slip of no length at all would let go again at the same moment, for ever.
@@ -171,7 +168,7 @@ class Dragged:
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
         deflection = bristle(knots, drive.speed_mm_s, limit, x, most)
-        self._add(t, SLIDE, x)
+        self._phases.append((t, SLIDE, x, 0.0, 0.0))
         self._x_t.append(knots)
         self._x_mm.append(deflection)
         return until, float(deflection[-1])
@@ -179,7 +176,7 @@ class Dragged:
     def _hold(self, t: float, x: float, since: float) -> None:
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
-        self._add(t, HELD, x, since)
+        self._phases.append((t, HELD, x, since, 0.0))
         self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
         now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
         held = np.concatenate([[now], self._release_mm[first:]])
