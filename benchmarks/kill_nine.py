@@ -32,7 +32,7 @@ from tactbench.core.matrix.store import Row, Store
 from tactbench.core.recording.reader import open_recording
 
 TWIN = (
-    "--sensor", "icub", "--task", "curvature", "--repeats", "2", "--estimator", "forest-10", "--estimator", "logistic",
+    "--sensor", "icub", "--task", "curvature", "--repeats", "2", "--estimator", "lda", "--estimator", "logistic",
     "--estimator", "knn",
 )  # fmt: skip
 TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing")

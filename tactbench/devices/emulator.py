@@ -105,6 +105,7 @@ class Fault:
         UsageError
             If name or key is unknown, or a value does not fit the field.
         """
+        import yaml
         from pydantic import TypeAdapter, ValidationError
 
         name, _, rest = text.partition(":")
@@ -113,7 +114,7 @@ class Fault:
         for key, _, value in (part.partition("=") for part in rest.split(",") if part):
             if key not in fields:
                 raise UnknownNameError(f"key of the fault {name!r}", key, fields)
-            given[key] = value.split("+") if fields[key].startswith("frozenset") else value
+            given[key] = value.split("+") if fields[key].startswith("frozenset") else yaml.safe_load(value)
         try:
             return TypeAdapter(cls).validate_python({"name": name, **given})
         except ValidationError as error:

@@ -46,6 +46,7 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
         _estimator(
             "logistic", "Logistic regression", CLASSIFICATION, "linear:logistic", linear=True, params={"C": 1.0}
         ),
+        _estimator("lda", "Linear discriminant analysis", CLASSIFICATION, "linear:discriminant", linear=True),
         _estimator(
             "knn", "k nearest neighbours", BOTH, "nonlinear:neighbours", linear=False, params={"n_neighbors": 15}
         ),

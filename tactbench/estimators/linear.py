@@ -1,8 +1,14 @@
-"""Linear regression and classification models (least squares, Lasso, ridge, logistic)."""
+"""Linear regression and classification models (least squares, Lasso, ridge, logistic, discriminant analysis)."""
 
 from __future__ import annotations
 
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.estimators.nonlinear import Wrapped
+from tactbench.plugin import FloatArray
 
 
 def least_squares(*, kind: str, seed: int, threads: int) -> Any:
@@ -40,3 +46,26 @@ def logistic(*, kind: str, seed: int, threads: int, C: float) -> Any:
     from sklearn.linear_model import LogisticRegression
 
     return LogisticRegression(C=C, solver="newton-cg", tol=1e-8, max_iter=2000)
+
+
+class Discriminant(Wrapped):
+    """Linear discriminant analysis without warnings where the means of all classes coincide.
+
+    In this case scikit-learn divides zero by zero for each direction's share of the variance, which is not used here.
+    """
+
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Discriminant:
+        """Fit the classes y (n,) to the features X (n, p); raises ValueError if no feature separates the classes."""
+        try:
+            with np.errstate(invalid="ignore"):
+                self.model.fit(X, y)
+        except IndexError as error:  # scikit-learn looks for the first of no directions
+            raise ValueError("no feature varies enough to separate the classes") from error
+        return self
+
+
+def discriminant(*, kind: str, seed: int, threads: int) -> Any:
+    """Return linear discriminant analysis (Fisher 1936): Gaussian classes with a common covariance, no parameters."""
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
+    return Discriminant(LinearDiscriminantAnalysis())

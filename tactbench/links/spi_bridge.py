@@ -11,6 +11,7 @@ import struct
 import zlib
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -120,7 +121,7 @@ FULL = b"full"
 """Text of the error reply to a batch for which the bridge has no room."""
 
 _ASK_S = 0.2
-"""Time between HELLO requests until the bridge answers [s] (assumed)."""
+"""Time between requests other than batches until the bridge answers [s] (assumed)."""
 
 
 class SpiBridge(SpiLink):
@@ -162,9 +163,12 @@ class SpiBridge(SpiLink):
         self._waiting: dict[int, tuple[int, ...]] = {}
         self._bytes = port
         try:
-            self._greet(wake_s)
-            reply = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
-            self.speed_hz, _ = self._unpacked(SETUP.format, reply)
+            hello = self._answer(Kind.HELLO, b"", wake_s)
+            layout = f"{HELLO.format}{len(hello.payload) - HELLO.size}s"
+            self.firmware, self._largest, self.holds, self.select_lines, name = self._unpacked(layout, hello)
+            self.name = name.decode("ascii", "replace")
+            setup = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
+            self.speed_hz, _ = self._unpacked(SETUP.format, setup)
         except BaseException:
             self._bytes.close()
             raise
@@ -173,37 +177,28 @@ class SpiBridge(SpiLink):
         """Return the time by which the port's timeouts are measured [s]."""
         return self._bytes.timer()
 
-    def _greet(self, wake_s: float) -> None:
-        deadline = self.timer() + wake_s
-        while True:
-            try:
-                hello = self._answer(Kind.HELLO, b"", min(_ASK_S, wake_s))
-                break
-            except LinkTimeout as error:
-                if self.timer() >= deadline:
-                    raise LinkError(
-                        f"{self.address}: no SPI bridge answered within {wake_s:g} s.",
-                        hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
-                    ) from error
-        layout = f"{HELLO.format}{len(hello.payload) - HELLO.size}s"
-        self.firmware, self._largest, self.holds, self.select_lines, name = self._unpacked(layout, hello)
-        self.name = name.decode("ascii", "replace")
-
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
-        """Send a request other than a batch, and return the reply; other frames are dropped."""
-        self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
-        deadline = self.timer() + timeout_s
-        while True:
-            frame, _ = self._next(timeout_s, deadline)
-            if frame.version != VERSION:
-                raise LinkError(
-                    f"{self.address}: the bridge uses version {frame.version} of the format, expected is {VERSION}.",
-                    hint="Update the bridge's firmware, or tactbench.",
-                )
-            if frame.kind == Kind.ERROR.reply:
-                raise self._refused(frame)
-            if frame.kind == kind.reply:
-                return frame
+        """Send a request other than a batch, again until it is answered; return the reply, and drop other frames."""
+        end_s = self.timer() + timeout_s
+        while (now_s := self.timer()) < end_s:
+            self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
+            with suppress(LinkTimeout):
+                while True:
+                    frame, _ = self._next(_ASK_S, min(now_s + _ASK_S, end_s))
+                    if frame.version != VERSION:
+                        raise LinkError(
+                            f"{self.address}: the bridge uses version {frame.version} of the format, expected is "
+                            f"{VERSION}.",
+                            hint="Update the bridge's firmware, or tactbench.",
+                        )
+                    if frame.kind == Kind.ERROR.reply:
+                        raise self._refused(frame)
+                    if frame.kind == kind.reply:
+                        return frame
+        raise LinkError(
+            f"{self.address}: no SPI bridge answered within {timeout_s:g} s.",
+            hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
+        )
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
         """Return the next frame, and the time of receipt of its last byte [ns]."""

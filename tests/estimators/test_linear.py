@@ -57,3 +57,11 @@ def test_trivial_answers_are_trivial():
     majority = build("majority")
     majority.fit(nothing, np.array([2, 1, 2, 0]))
     assert set(majority.predict(nothing)) == {2}
+
+
+def test_a_discriminant_of_classes_with_one_mean_says_nothing_aloud():
+    from tactbench.estimators.linear import discriminant
+
+    X = np.tile(np.eye(3), (4, 1))
+    y = np.repeat([0, 1], 6)
+    assert set(discriminant(kind="classification", seed=0, threads=1).fit(X, y).predict(X)) <= {0, 1}

@@ -8,7 +8,6 @@ warning, a refusal where there is an answer, an answer where there is none, or a
 from __future__ import annotations
 
 import math
-import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -94,12 +93,3 @@ def judge(name, family, seed, number):
     if case.right == "refusal":
         return Outcome("failed", "answered although there is no answer", case.drawn)
     return Outcome("passed", "", case.drawn)
-
-
-def judged(job):
-    """Return verdict, detail, what was drawn and the seconds of a case: family, seed and number."""
-    from tests.hard.families import families
-
-    began = time.perf_counter()
-    outcome = judge(job[0], families()[job[0]], *job[1:])
-    return outcome.verdict, outcome.detail, outcome.drawn, time.perf_counter() - began

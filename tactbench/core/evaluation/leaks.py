@@ -115,4 +115,4 @@ def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
 
 def _factors(count: int) -> _Hashes:
     """Return `count` odd factors for hashes: the powers of :data:`ODD`, modulo 2^64."""
-    return np.cumprod(np.full(count, ODD))
+    return np.cumprod(np.full(count, ODD), dtype=np.uint64)

@@ -11,17 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tactbench.plugin import Acquisition, NotApplicable, Scene, SensorDescriptor
 from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, with_limits
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import EmulatedDevice
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, with_limits
 
 FORCE = "fz"
 """Channel name of the pressing force in a simulated rig and in emulated force sensors."""
@@ -127,18 +124,13 @@ class PressEmulators(RigEmulators):
         """Press of the present scene; None: no sensor is pressed."""
         self.pushed_n = 0.0
         """Force of a push by hand on the force sensor [N], added to that of the skin."""
-        self._motor: Any = None
-        devices: dict[str, EmulatedDevice] = {}
-        for sensor in file.sensors:
+        self.devices: dict[str, Any] = {}
+        for sensor in file.sensors:  # which share force sensor and axes
             own = emulators_of(with_sensor(limited, sensor), registry, sensor, self._sensed)
-            devices |= {name: device for name, device in own.items() if name not in devices}
-        self.devices = devices
-        for name in axes_of(self._settings):
-            axis: Any = devices[name].emulator if name in devices else None
-            if axis is not None:  # the platform's weight is not modelled
-                axis.press_against(self._force_n if name == MOTOR else None)
-            if name == MOTOR:
-                self._motor = axis
+            self.devices = {**own, **self.devices}
+        self._motor = self.devices[MOTOR].emulator if MOTOR in self.devices else None
+        if self._motor is not None:  # the platform's weight on its rails is not modelled
+            self._motor.press_against(self._force_n)
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Put the sensor of a scene below the motor; the height of its skin is drawn at random."""

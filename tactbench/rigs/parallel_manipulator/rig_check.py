@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.plugin import RigError, UsageError, load_registry
+from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import CheckTable, LoopModel, PositionerFacts, RigCheck, RigFile, largest_force_n
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, check_move, links, solve_inverse, way
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, RigSettings, axes_of, axis_of, with_limits
@@ -55,7 +55,7 @@ def check(file: RigFile) -> RigCheck:
     if isinstance(delta, LinearDelta):
         try:
             _check_places(delta, settings)
-        except RigError as error:
+        except TactbenchError as error:
             problems.append(str(error))
         together_n = _together_n(delta, settings, [most_n[name] for name in JOINTS])
         if math.isfinite(together_n):

@@ -1,5 +1,6 @@
 """The answer delay: its parts against the filter that is used, the sum, and what the row says of it."""
 
+import itertools
 from dataclasses import replace
 from functools import partial
 
@@ -7,7 +8,14 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, peak_rss_mb, stated_delay_ms
+from tactbench.core.evaluation.delay import (
+    NO_LINK,
+    NO_RATE,
+    answer_delay_ms,
+    calls_s,
+    peak_rss_mb,
+    stated_delay_ms,
+)
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import load_registry
@@ -73,7 +81,20 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
     for step_ns in (0, 1_500_000_000):  # a row a press: the pause between presses is no sampling interval
         timeless = load_dataset(TASK, pressed(tmp_path / f"{step_ns}", step_ns=step_ns))
         assert reading_delay_ms(timeless) == ({}, NO_RATE)
-    assert answer_delay_ms({"features": 0.1, "prediction": 0.1}, "features") is None
+    known = {"sampling": 1.0, "window": 2.0, "link": 4.0, "features": 8.0, "prediction": 16.0}
+    for lost, total in (("link", 27.0), *((name, None) for name in known if name != "link")):
+        assert answer_delay_ms({name: ms for name, ms in known.items() if name != lost}, "features") == total
+    assert [answer_delay_ms(parts, "nothing") for parts in ({}, {"prediction": 16.0})] == [None, 16.0]
+
+
+@pytest.mark.parametrize(("step_s", "calls"), [(0.0, 200), (2.0**-7, 39), (1.0, 20)])
+def test_calls_are_timed_until_their_number_or_their_time_is_enough(step_s, calls):
+    """After 20 calls, 0.3 s are enough; one call before is not counted."""
+    seen, looks = [], itertools.count()
+    spent_s = calls_s(range(1000), seen.append, lambda: step_s * next(looks))
+    assert spent_s.tolist() == [step_s] * calls
+    assert len(seen) == calls + 1
+    assert (seen[0], min(seen), max(seen) > 500) == (0, 0, True)
 
 
 def test_the_memory_of_this_process_is_in_megabytes():

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy import stats
 from sklearn import metrics as reference
 
+from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.interval import ReplicateUnits, influences, score_interval, transform_of
-from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.metrics import METRICS, Metric
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -36,6 +37,18 @@ def test_classification_metrics_are_those_of_scikit_learn(seed, n, classes):
     assert METRICS["accuracy"].of(y, p, classes) == pytest.approx(reference.accuracy_score(y, p), abs=1e-12)
     recall = reference.recall_score(y, p, labels=np.unique(y), average="macro")
     assert METRICS["balanced_accuracy"].of(y, p, classes) == pytest.approx(recall, abs=1e-12)
+
+
+def test_a_metric_of_the_callers_own_may_be_undefined_and_its_other_errors_are_named():
+    def own(y, p):
+        if len(y) == 1:
+            raise ValueError
+        return y[2] - p[0]
+
+    metric = Metric("own", "regression", None, None, function=own)
+    assert (np.isnan(metric.of(np.zeros(1), np.zeros(1))), metric.of(np.arange(3.0), np.ones(3))) == (True, 1.0)
+    with pytest.raises(UsageError, match="IndexError"):
+        metric.of(np.zeros(2), np.zeros(2))
 
 
 def interval(y, p, cluster, metric="rmse", n_classes=0):

@@ -13,7 +13,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import FeatureScale, apart, causal_mean, keep, part
-from tactbench.core.evaluation.splits import Assignment, choose_split, inner_splits, make_splits
+from tactbench.core.evaluation.splits import Assignment, OwnSplit, choose_split, inner_splits, make_splits
 from tactbench.plugin import Summary
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
@@ -38,6 +38,23 @@ def test_the_groups_of_rows_are_those_that_the_split_keeps_apart(tmp_path, split
     made = load_task(force_task(splits=("press",)), paths, "deployable", split)
     assert set(made.groups) == set(groups)
     assert len(made.groups) == len(made.X) == 60
+
+
+def test_folds_of_the_caller_are_indices_or_masks_and_name_a_leak(tmp_path):
+    paths, mask = sessions(tmp_path, n=20), np.arange(60) < 20
+    own = load_task(force_task(), paths, "deployable", OwnSplit([(~mask, np.arange(20)), ([50], [0, 1])], "session"))
+    assert [(len(train), len(test)) for train, test in own.folds] == [(40, 20), (1, 2)]
+    assert (own.unit, own.stamps, own.assignments[0].groups) == ("session", (), "session")
+    mixed = load_task(force_task(), paths, "deployable", OwnSplit([(mask, ~mask), ([0, 30], [31])], None))
+    assert (mixed.unit, len(mixed.stamps), mixed.assignments[1].groups) == (None, 1, "session")
+    assert mixed.stamps[0].startswith("leaks: ")
+    assert "recording b on both sides of fold 2" in mixed.stamps[0]
+    for pairs in ([], [([0, 0], [1])], [([60], [1])], [(mask[1:], mask)]):
+        with pytest.raises(UsageError):
+            load_task(force_task(), paths, "deployable", OwnSplit(pairs, None))
+    for groups in ("object", np.arange(59), np.full(60, np.nan)):
+        with pytest.raises(UsageError, match="groups"):
+            load_task(force_task(), paths, "deployable", OwnSplit([(mask, ~mask)], groups))
 
 
 def test_two_groups_that_train_are_kept_apart_where_parameters_are_chosen_too(tmp_path):

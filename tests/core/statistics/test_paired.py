@@ -34,6 +34,7 @@ def test_other_replicates_are_not_paired():
     assert (together.paired, apart.paired, apart.smallest_p) == (True, False, 0.0)
     deviation = np.sqrt(A.var(ddof=1) / 7 + B.var(ddof=1) / 7)
     assert apart.high - apart.value == pytest.approx(stats.t.ppf(0.975, 6) * deviation, rel=1e-9)
+    assert apart.p == pytest.approx(2 * stats.t.sf(apart.value / deviation, 6))
 
 
 def scored(cell, scores, **more):
