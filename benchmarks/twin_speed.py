@@ -41,7 +41,7 @@ sensor, scenes = registry.sensors[name], [planned.scene for planned in registry.
 if changed:
     import dataclasses
     from tactbench.core.spec.scene import Simulation
-    from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
+    from tactbench.rigs.twin.synthesis import DEFAULT, RUNGS
     RUNGS["point"] = dataclasses.replace(DEFAULT, **changed)
     scenes = [scene.simulated_as(Simulation(rung="point")) for scene in scenes]
 def record(seed):

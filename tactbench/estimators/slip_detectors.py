@@ -19,16 +19,18 @@ BANDS = 16
 
 def always(*, kind: str, seed: int, threads: int) -> Any:
     """Return a detector that reports slip in every frame."""
-    from sklearn.dummy import DummyRegressor
-
-    return DummyRegressor(strategy="constant", constant=1.0)
+    return _constant(1.0)
 
 
 def never(*, kind: str, seed: int, threads: int) -> Any:
     """Return a detector that never reports slip."""
+    return _constant(0.0)
+
+
+def _constant(answer: float) -> Any:
     from sklearn.dummy import DummyRegressor
 
-    return DummyRegressor(strategy="constant", constant=0.0)
+    return DummyRegressor(strategy="constant", constant=answer)
 
 
 class MeanFeature:

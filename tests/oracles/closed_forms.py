@@ -9,33 +9,6 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Hertz:
-    """A paraboloid ``r²/2R`` on a half-space (section 4.2)."""
-
-    radius_mm: float
-    modulus_mpa: float
-    """Plane strain modulus ``E* = E / (1 - nu²)``."""
-
-    def depth_mm(self, force_n: float) -> float:
-        return self.contact_radius_mm(force_n) ** 2 / self.radius_mm
-
-    def contact_radius_mm(self, force_n: float) -> float:
-        return math.cbrt(3 * force_n * self.radius_mm / (4 * self.modulus_mpa))
-
-    def largest_pressure_mpa(self, force_n: float) -> float:
-        return 1.5 * force_n / (math.pi * self.contact_radius_mm(force_n) ** 2)
-
-    def pressure_mpa(self, force_n: float, r_mm: np.ndarray) -> np.ndarray:
-        inside = np.clip(1 - (r_mm / self.contact_radius_mm(force_n)) ** 2, 0.0, None)
-        return self.largest_pressure_mpa(force_n) * np.sqrt(inside)
-
-    def radial_mm(self, force_n: float, r_mm: np.ndarray, poisson: float) -> np.ndarray:
-        """Return how far the surface moves from the axis (below 0: towards it) at distances above 0 (3.41b)."""
-        inside = 1 - np.clip(1 - (r_mm / self.contact_radius_mm(force_n)) ** 2, 0.0, None) ** 1.5
-        return -(1 - 2 * poisson) / (2 * math.pi * (1 - poisson) * self.modulus_mpa) * force_n * inside / r_mm
-
-
-@dataclass(frozen=True)
 class CattaneoMindlin:
     """A pressed sphere that is then pushed sideways below slip (section 7.2): inside a circle it sticks.
 

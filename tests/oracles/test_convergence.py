@@ -13,8 +13,8 @@ from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
-from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.rigs.twin.synthesis import DEFAULT
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
 from tactbench.sensors.icub.spec import SPEC as ICUB
 

@@ -27,17 +27,6 @@ def test_every_fact_says_where_it_comes_from(name):
     assert not [fact for fact, source in found if source is None or len(source.reference) <= 5]
 
 
-def test_table_one_of_the_paper_comes_out():
-    biotac, icub = SPECS["biotac"], SPECS["icub"]
-    assert (len(biotac.channels("taxel")), len(icub.channels("taxel"))) == (19, 12)
-    assert (biotac.principle, icub.principle) == ("resistive", "capacitive")
-    kinds = ("dc_pressure", "dc_temperature", "ac_pressure", "ac_temperature")
-    pressure, temperature, vibration, flow = (channel for kind in kinds for channel in biotac.channels(kind))
-    assert (str(pressure.measures), str(temperature.measures)) == ("0–100 kPa", "0–75 degC")
-    assert (str(vibration.band), str(flow.band)) == ("10–1040 Hz", "0.45–22.6 Hz")
-    assert [stream.rate_hz for stream in biotac.streams] == [100.0, 2200.0]
-
-
 def test_a_spec_that_still_states_its_largest_slope_is_read():
     """Recordings keep the spec they were made with; this field is no longer one."""
     stated = SPECS["icub"].model_dump()

@@ -51,16 +51,6 @@ def test_the_reference_is_where_the_indenter_was_put(presses):
         assert len(force_n) == len(place.data)
 
 
-def test_no_other_recording_has_the_place():
-    scene = FIRST.model_copy(update={"observe": ("taxel",)})
-    with_place, without = (twin().open(REGISTRY.sensors["icub"], one, seed=1) for one in (FIRST, scene))
-    with with_place as first, without as second:
-        assert [stream.name for stream in first.reference] == ["force_torque", "contact_point"]
-        assert [stream.name for stream in second.reference] == ["force_torque"]
-        for name, samples in second.samples.items():
-            np.testing.assert_array_equal(samples.data, first.samples[name].data)
-
-
 def test_a_slide_has_no_place():
     scene = FIRST.model_copy(update={"slide": Slide(speed=assumed(5.0, "mm/s", "a test"))})
     with (

@@ -108,21 +108,6 @@ def test_a_texture_that_passes_at_tens_of_hertz_is_heard_between_30_and_200(name
     assert band_rms(slip, 30, 200) > 2 * band_rms(rest, 30, 200)
 
 
-def test_stick_slip_is_heard_where_it_repeats():
-    acquisition = record("biotac", SCENES["default-10mm-s-1.5N-test"])
-    _, slip = rest_and_slip(SCENES["default-10mm-s-1.5N-test"])
-    per_s = 1 / np.median(np.diff(acquisition.run.sliding.let_go_s))
-    assert 30 < per_s < 200
-    assert np.fft.rfftfreq(slip.size, 1 / 2200)[heard(slip, 20)] == pytest.approx(per_s, rel=0.02)
-    assert band_rms(slip, 30, 200) > 12
-
-
-def heard(counts, low_hz):
-    spectrum = np.abs(np.fft.rfft((counts - counts.mean()) * np.hanning(counts.size)))
-    spectrum[: round(low_hz * counts.size / 2200)] = 0
-    return int(spectrum.argmax())
-
-
 def test_above_100_hz_a_steady_slide_is_as_quiet_as_rest_and_the_recording_says_so():
     rest, slip = rest_and_slip(SCENES["coarse-50mm-s-0.5N-test"])
     assert band_rms(slip, 30, 100) > 2 * band_rms(rest, 30, 100)

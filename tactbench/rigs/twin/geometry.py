@@ -122,11 +122,6 @@ def outer_radius_mm(sheet: SkinSheet) -> float:
     return math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
 
 
-def radius_mm(indenter: Indenter) -> float:
-    """Return the radius [mm] of a spherical cap; infinity for a flat surface and any other shape."""
-    return math.inf if indenter.radius is None else indenter.radius.to("mm")
-
-
 def gap_mm(grid: SkinGrid, contact: Contact, sheet: SkinSheet | None = None) -> FloatArray:
     """Return the (nx, ns) gap between unloaded skin and indenter at zero approach; a skin without a sheet is flat.
 
@@ -197,14 +192,15 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
         axis; if it is tilted by more than 45 degrees; or if its apex is off the sheet.
     """
     dx, ds = grid.cell_mm
-    if not contact.radius_mm >= max(dx, ds):
+    cell = max(dx, ds)
+    if not contact.radius_mm >= cell:
         raise RigError(
             f"A cap of radius {contact.radius_mm:g} mm is smaller than a cell of the skin ({dx:.2f} x {ds:.2f} mm): "
             "the contact would be one cell wide whatever the load.",
-            hint=f"Use a radius of at least {3 * max(dx, ds):.1f} mm, or a sensor spec with more cells.",
+            hint=f"Use a radius of at least {3 * cell:.1f} mm, or a sensor spec with more cells.",
         )
     if (shape := contact.shape) is not None:
-        cell, around = max(dx, ds), np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+        around = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
         risen = float(shape.height_mm(cell * np.cos(around), cell * np.sin(around)).max())
         if not risen <= cell * (1 + 1e-9):  # rounding of a flank at exactly 45 degrees
             sizes = ", ".join(f"{name} {value:g}" for name, value in shape.sizes)

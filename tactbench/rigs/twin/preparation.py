@@ -18,10 +18,9 @@ from tactbench.plugin import (
     SensorDescriptor,
     SensorSpec,
 )
-from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
-from tactbench.rigs.twin.geometry import Contact, radius_mm, shape_of
+from tactbench.rigs.twin.geometry import Contact, shape_of
 from tactbench.rigs.twin.planner import Plan
-from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
+from tactbench.rigs.twin.synthesis import DEFAULT, Fidelity, Load, Synthesis, Track, rung
 
 _OWN_CLOCK_FROM = 2.0
 """Ratio of a stream's rate to the sensor's slowest rate from which the stream is simulated on its own clock."""
@@ -67,7 +66,12 @@ def prepare(
         t_s=t_s,
         load=load,
         tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
-        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0, shape=shape_of(scene.indenter, indenters)),
+        contact=Contact(
+            math.inf if scene.indenter.radius is None else scene.indenter.radius.to("mm"),
+            0.0,
+            0.0,
+            shape=shape_of(scene.indenter, indenters),
+        ),
         reference_n=load.at(t_s),
         lent=plan.lent,
         forced=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),

@@ -177,8 +177,8 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     blocks.append(Block(REFERENCE_STREAM, _ns(run.t_s), measured))
     places: tuple[StreamSpec, ...] = ()
     if "position" in run.scene.observe:
-        place, values, quality = _contact_point(run, rate)
-        blocks.append(Block(place.name, _ns(run.t_s), values, quality))
+        place, block = _contact_point(run, rate)
+        blocks.append(block)
         places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     shape = run.contact.shape
@@ -200,8 +200,8 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     )
 
 
-def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArray, npt.NDArray[np.uint8]]:
-    """Return the stream of the apex of the indenter on the skin, its (n, 2) samples [m] and their quality.
+def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, Block]:
+    """Return the stream of the apex of the indenter on the skin, and its (n, 2) samples [m].
 
     There are no samples for times without contact.
 
@@ -218,7 +218,8 @@ def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArr
     place_m = 1e-3 * np.array([run.contact.x_mm, run.contact.s_mm])
     quality = np.where(run.load.at(run.t_s) > 0, Quality.GOOD, Quality.MISSING).astype(np.uint8)
     stream = StreamSpec(name="contact_point", rate_hz=rate_hz, rate_source=_ONE_CLOCK, channels=_PLACE_CHANNELS)
-    return stream, np.tile(place_m, (run.t_s.size, 1)), np.column_stack([quality, quality])
+    values = np.tile(place_m, (run.t_s.size, 1))
+    return stream, Block(stream.name, _ns(run.t_s), values, np.column_stack([quality, quality]))
 
 
 def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]]:

@@ -18,10 +18,10 @@ from tactbench.rigs.twin.contact.pressing import medium_of, press_of
 from tactbench.rigs.twin.effects.heat import HeatedCore
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive, Mode
-from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.rig import Twin, build
+from tactbench.rigs.twin.synthesis import DEFAULT
 
 RADIUS_MM = 10.0
 _TASK = "force"

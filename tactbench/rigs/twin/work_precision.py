@@ -24,9 +24,9 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
-from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.synthesis import RUNGS
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)
 """Radii of the indenters: caps from the sharpest to the bluntest, and the flat surface of the force task."""
@@ -78,7 +78,9 @@ def _measured(
         names = read_names(prepare(sensor, scene, 1, plan))
         pressed(prepare(sensor, scene, 1, plan, fidelity), [], fidelity)  # refuses a skin that it does not do at once
         if radius not in truth:
-            truth[radius] = _true(sensor, scene, plan, names)
+            # Each load solved by itself.
+            press, read = pressed(prepare(sensor, scene, 1, plan, _REFERENCE), names, _REFERENCE)
+            truth[radius] = np.stack([read(press(float(load))) - read(press(0.0)) for load in _loads()])
         for _ in range(rounds):
             forget_tables()
             began = time.process_time()
@@ -124,11 +126,3 @@ def _loads() -> FloatArray:
     # The golden ratio's multiples fill an interval evenly and never fall on a table's nodes.
     places = (0.5 + np.arange(1, LOADS + 1) * (math.sqrt(5) - 1) / 2) % 1.0
     return 5.0 * np.sort(places)
-
-
-def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
-    """Return the (loads, channels) changes from rest with the reference settings, each load solved by itself."""
-    run = prepare(sensor, scene, 1, plan, _REFERENCE)
-    press, read = pressed(run, names, _REFERENCE)
-    rest = read(press(0.0))
-    return np.stack([read(press(float(load))) - rest for load in _loads()])

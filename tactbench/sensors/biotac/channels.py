@@ -52,30 +52,26 @@ _MIDLINE = (0.0, 0.0, -1.0)
 
 # Electrodes 1-6; 11-16 are their mirror images in y.
 _FLANK = (
-    Electrode(0.993, -4.855, -1.116, (0.196, -0.956, -0.220)),
-    Electrode(-2.700, -3.513, -3.670, _LOWER),
-    Electrode(-6.200, -3.513, -3.670, _LOWER),
-    Electrode(-8.000, -4.956, -1.116, _SIDE),
-    Electrode(-10.500, -3.513, -3.670, _LOWER),
-    Electrode(-13.400, -4.956, -1.116, _SIDE),
+    (0.993, -4.855, -1.116, (0.196, -0.956, -0.220)),
+    (-2.700, -3.513, -3.670, _LOWER),
+    (-6.200, -3.513, -3.670, _LOWER),
+    (-8.000, -4.956, -1.116, _SIDE),
+    (-10.500, -3.513, -3.670, _LOWER),
+    (-13.400, -4.956, -1.116, _SIDE),
 )
-
-
-def _mirrored(electrode: Electrode) -> Electrode:
-    x, y, z = electrode.normal
-    return Electrode(electrode.x_mm, -electrode.y_mm, electrode.z_mm, (x, -y, z))
-
-
-ELECTRODES: tuple[Electrode, ...] = (
-    *_FLANK,
-    Electrode(4.763, 0.000, -2.330, _FACET),
-    Electrode(3.031, -1.950, -3.330, _FACET),
-    Electrode(3.031, 1.950, -3.330, _FACET),
-    Electrode(1.299, 0.000, -4.330, _FACET),
-    *(_mirrored(electrode) for electrode in _FLANK),
-    Electrode(-2.800, 0.000, -5.080, _MIDLINE),
-    Electrode(-9.800, 0.000, -5.080, _MIDLINE),
-    Electrode(-13.600, 0.000, -5.080, _MIDLINE),
+ELECTRODES = tuple(
+    Electrode(*place)
+    for place in (
+        *_FLANK,
+        (4.763, 0.000, -2.330, _FACET),
+        (3.031, -1.950, -3.330, _FACET),
+        (3.031, 1.950, -3.330, _FACET),
+        (1.299, 0.000, -4.330, _FACET),
+        *((x, -y, z, (along, -across, up)) for x, y, z, (along, across, up) in _FLANK),
+        (-2.800, 0.000, -5.080, _MIDLINE),
+        (-9.800, 0.000, -5.080, _MIDLINE),
+        (-13.600, 0.000, -5.080, _MIDLINE),
+    )
 )
 """The BioTac's electrodes 1 to 19, in order of their numbers."""
 

@@ -63,7 +63,7 @@ from tactbench.sensors.biotac.codec import (
     property_command,
     property_text,
 )
-from tactbench.sensors.biotac.frames import BioTacOptions, FrameBatches, streams_of
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME, BioTacOptions, FrameBatches, streams_of
 
 PATIENCE_S = 0.5
 """Seconds (assumed) after the end of a batch until its reply counts as lost. USB and a busy host take less."""
@@ -116,7 +116,8 @@ class BioTacDriver(Driver):
             speed_hz=self._link.speed_hz,
             select=options.select,
             resends=options.resends,
-            words=options.batch_words,
+            # About as many words as in the default frame: a batch for each short one would ask too much of a bridge.
+            words=len(options.frame) * max(1, len(DEFAULT_FRAME) // len(options.frame)),
         )
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0

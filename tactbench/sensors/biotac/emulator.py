@@ -187,8 +187,11 @@ class Emulator(SpiDeviceEmulator):
     def _command(self, first: int, second: int, now_s: float) -> _Answer:
         """Return the answer to a command; parity is checked first, then the command, then its channel [assumed]."""
         if first in (0x20, 0x50):
-            # 20 [sourced: driver] and 50, as the manual prints it, of even parity.
-            return self._resend(now_s)
+            # 20 [sourced: driver] and 50, as the manual prints it, of even parity. The last two bytes sent, perhaps an
+            # error reply, are repeated without a pause [assumed]. With none an error is sent, as the driver has it; the
+            # manual says that such a request is ignored.
+            last = self._last
+            return self._error(0x5F) if last is None else self._word(last.word, last.channel, now_s)
         if not parity_holds(first) or (first in (READ, WRITE) and not parity_holds(second)):
             return self._error(0x45)
         if first & 0x80:
@@ -214,13 +217,6 @@ class Emulator(SpiDeviceEmulator):
         answer = self._word(word, channel, now_s)
         answer.early, answer.ready_s = 0x2D, now_s + SAMPLING_PAUSE.to("s")
         return answer
-
-    def _resend(self, now_s: float) -> _Answer:
-        """Return the last two bytes sent, which may be an error reply [assumed]; no pause is needed [assumed]."""
-        if self._last is not None:
-            return self._word(self._last.word, self._last.channel, now_s)
-        # As the driver has it; the manual says that such a request is ignored.
-        return self._error(0x5F)
 
     def _word(self, word: bytes, channel: str, now_s: float) -> _Answer:
         """Return the answer with `word` after faults of the line; a resend repeats the word without these faults."""

@@ -302,8 +302,6 @@ class BioTacOptions(Options):
     """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
     resends: int = Field(default=0, ge=0, le=3)
     """Number of times that every word is requested again, so that words of wrong parity can be replaced."""
-    batch_words: int | None = Field(default=None, ge=1, le=1000)
-    """Words in a batch; None: one frame. Reduce for a bridge with a short buffer: a word is 14 bytes of payload."""
     batches_ahead: int = Field(default=8, ge=2, le=16)
     """Number of batches sent ahead, as far as the adapter can store them: the host may be late by their duration."""
 

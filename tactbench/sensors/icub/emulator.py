@@ -74,24 +74,21 @@ class BoardFault(Fault):
         "stuck-taxel": "the taxels `channels` stay at what they read when the fault began",
         "not-connected": "the chip does not answer: all results are FFFF",
         "no-ack": "the taxels `channels` are not acknowledged: their results are 0",
-        "error-word": "the tail carries the bits of `word` besides its own",
         "unplugged": "the board has no power: it does not answer, and must be set up anew afterwards",
     }
 
     half: Literal["head", "tail"] | None = None
     """Half of the sample whose frames are dropped, doubled or late; None: both."""
     channels: frozenset[str] = frozenset({"T1"})
-    word: int = NO_ACK
-    """Bits that the fault sets in the sample's error word."""
     delay_s: float = 0.01
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        good = self.half in (None, "head", "tail") and 0 <= self.word <= 0xFFFF and self.delay_s >= 0
+        good = self.half in (None, "head", "tail") and self.delay_s >= 0
         if not good or not self.channels <= set(_CHANNELS):
             raise UsageError(
                 f"The fault {self.name!r} has a value outside its range.",
-                hint="Give half as head or tail, channels from T1 to T12, word from 0 to 0xFFFF, delay_s from 0 up.",
+                hint="Give half as head or tail, channels from T1 to T12, delay_s from 0 up.",
             )
 
 
@@ -232,8 +229,6 @@ class Bus(DeviceEmulator):
                 case "not-connected":
                     word |= NOT_CONNECTED | 0xFFF0
                     taxels = [0] * TAXELS
-                case "error-word":
-                    word |= fault.word
         return taxels, word
 
     def _send(self, frames: Iterable[CanFrame], now_s: float) -> None:

@@ -81,7 +81,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
         blocks=(to_block(kept),),
         clock="host",
-        remarks=(f"Board {board}, triangle {triangle}, {rate.reference}.",),
+        remarks=(f"Board {board}, triangle {triangle}, {text}.",),
         counts={name: number for name, number in counts.items() if number},
     )
 

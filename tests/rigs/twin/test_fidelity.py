@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 from tactbench.plugin import ForceRamp, Indenter, Scene, SensorDescriptor
-from tactbench.rigs.twin.fidelity import DEFAULT, FINE, Fidelity
 from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.synthesis import DEFAULT, FINE, Fidelity
 from tests.rigs.twin.conftest import TWIN, q
 
 SCENE = Scene(name="cap", indenter=Indenter(radius=q(10.0)), profile=ForceRamp(samples=50))

@@ -266,8 +266,8 @@ def test_a_sensor_that_is_no_biotac_is_refused_with_its_serial_number(sensor, re
         driver.identify()
 
 
-def test_another_frame_select_and_shorter_batches():
-    options = {"frame": "PAC PDC, E1", "batch_words": 7, "select": 6}
+def test_another_frame_and_select():
+    options = {"frame": "PAC PDC, E1", "select": 6}
     with virtual(Sensed(), options=options) as (driver, _, _):
         slow, fast = driver.streams
         assert [channel.name for channel in slow.channels] == ["E1", "PDC"]

@@ -45,14 +45,6 @@ def test_the_conduction_grid_converges():
     assert default < 0.5 * coarse
 
 
-def test_electrodes_are_read_one_at_a_time():
-    # A divider each over its own resistance to the excitations: an electrode left out changes no other.
-    state = state_of(SPEC, GRID, dent(GRID, 0.6, -5.0, 0.5))
-    ohm = 1e3 * Electrodes(SPEC, GRID).resistances(state) / SPEC.parameters["conductivity"].to("S/m")
-    # The maker's formula, turned round.
-    np.testing.assert_allclose((4095.0 / reading(state) - 1.0) * 10e3, ohm, rtol=1e-12)
-
-
 def test_wanted_channels_come_in_the_order_asked_for():
     state = state_of(SPEC, GRID, dent(GRID, 0.5, -5.0, 0.0), fluid_pressure_mpa=3.65e-3)
     every = reading(state)

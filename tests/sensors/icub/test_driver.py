@@ -194,9 +194,6 @@ FAULTS = {
         {2: (SUSPECT,) + (SUSPECT | SATURATED,) * 2 + (SUSPECT,) * 9}, 10,
         {"samples not acknowledged": 1, "T2 out of range": 1, "T3 out of range": 1},
     ),
-    "error-word:start_s=0.55,end_s=0.57,word=0x8001": (
-        {2: (SUSPECT,) * 11 + (SUSPECT | SATURATED,)}, 10, {"samples not acknowledged": 1, "T12 out of range": 1},
-    ),
     "unplugged:start_s=0.55": ({}, 2, {}),
 }  # fmt: skip
 """Fault -> marked samples, how many samples, counts."""

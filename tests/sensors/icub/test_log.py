@@ -13,7 +13,7 @@ from tests.sensors.icub.emulated import in_virtual_time, joined
 EPOCH_S = 1_700_000_000.25
 FAULTS = (
     "dropped-frame:half=head,every=17", "dropped-frame:half=tail,every=23", "doubled-frame:every=31",
-    "not-connected:start_s=0.8,end_s=0.85", "error-word:every=3,start_s=1.2,end_s=1.3,word=0x8000",
+    "not-connected:start_s=0.8,end_s=0.85", "no-ack:every=3,start_s=1.2,end_s=1.3",
 )  # fmt: skip
 
 

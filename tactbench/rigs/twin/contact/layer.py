@@ -20,7 +20,6 @@ def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
     ``q (1-2nu) / (2 (1-nu)²)`` for long ones (Winkler), ``2 q³ / 3`` for an incompressible layer. Valid for every
     q >= 0 and 0 <= nu <= 1/2. A wave of pressure of amplitude p sinks by ``2 M p / (E* k)``.
     """
-    q = np.asarray(q, dtype=np.float64)
     a, c = 3 - 4 * poisson, 5 - 12 * poisson + 8 * poisson**2
     small = q < _SERIES_BELOW
     y = 2 * np.where(small, q, 0.0)
@@ -48,7 +47,6 @@ def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray,
 
     D is the denominator of :func:`compliance_shape`. For long waves both tractions give ``q``: simple shear.
     """
-    q = np.asarray(q, dtype=np.float64)
     a, c = 3 - 4 * poisson, 5 - 12 * poisson + 8 * poisson**2
     # Numerators and D times e^-2q.
     decay = np.exp(-2 * q)

@@ -9,8 +9,8 @@ energy, gradient and conjugate directions are computed in Fourier space, where t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -82,7 +82,8 @@ class LowModes:
     the matrix is assembled from one transform of D, without integration.
     """
 
-    def __init__(self, spectrum: Spectrum, stiffness: FloatArray, *, count: int, zero_mean: bool) -> None:
+    def __init__(self, medium: Medium) -> None:
+        spectrum, stiffness = medium.spectrum, medium.stiffness
         nx, ns = spectrum.shape
         nh = spectrum.half[1]
         rows, columns = np.meshgrid(np.arange(nx), np.arange(nh), indexing="ij")
@@ -92,10 +93,10 @@ class LowModes:
         free &= spectrum.mirrored | (2 * np.abs(signed) < nx)
         chosen = np.flatnonzero(free)
         order = np.argsort(stiffness.reshape(-1)[chosen], kind="stable")
-        chosen = np.sort(chosen[order[:count]])
+        chosen = np.sort(chosen[order[: medium.low_modes]])
         m, n = signed.reshape(-1)[chosen], columns.reshape(-1)[chosen]
         self._modes = chosen.size
-        self._mean = not zero_mean
+        self._mean = not medium.zero_mean
         self.size = 2 * self._modes + int(self._mean)
         """Number of basis functions: cosines, sines and, unless the mean is held at zero, the constant."""
         apart, together = m[:, None] - m, m[:, None] + m
@@ -162,14 +163,10 @@ class LowModes:
         diagonal += self._stiffness
 
 
-class LocalLaw(Protocol):
-    """A function from a cell's deflection to its restoring pressure, independent of other cells."""
-
-    def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-        """Return the (nx, ns) restoring pressure [MPa] (a new array) and the summed energy density [N/mm].
-
-        Fills `tangent` with the (nx, ns) derivative of the pressure [MPa/mm].
-        """
+LocalLaw = Callable[[FloatArray, FloatArray], tuple[FloatArray, float]]
+"""Function from the (nx, ns) deflection of cells [mm], independent of other cells, to their (nx, ns) restoring pressure
+[MPa] (a new array) and the summed energy density [N/mm]; it fills its second argument with the (nx, ns) derivative of
+the pressure [MPa/mm]."""
 
 
 @dataclass(frozen=True)

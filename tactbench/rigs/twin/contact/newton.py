@@ -293,7 +293,7 @@ class Preconditioner:
         self._lapack: Any = lapack
         self._medium = medium
         self._spectrum = medium.spectrum
-        self._low = LowModes(medium.spectrum, medium.stiffness, count=medium.low_modes, zero_mean=medium.zero_mean)
+        self._low = LowModes(medium)
         size = self._low.size
         self._matrix = np.empty((size + 1, size + 1), order="F")
         self._right = np.empty(size + 1)

@@ -29,9 +29,8 @@ from tactbench.plugin.simulation import (
 )
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, LocalPress, Press, whole_skin
-from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import gap_mm, skin_grid
-from tactbench.rigs.twin.synthesis import Synthesis
+from tactbench.rigs.twin.synthesis import Fidelity, Synthesis
 
 Read = Callable[[SkinState], FloatArray]
 _MAY_BE_ZERO = frozenset({

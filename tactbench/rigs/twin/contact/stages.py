@@ -12,11 +12,10 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
+from tactbench.rigs.twin.contact.press import check_reach, remarks
 from tactbench.rigs.twin.contact.pressing import pressed, slide_of
-from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.fidelity import FINE, RUNGS
 from tactbench.rigs.twin.geometry import check_contact, skin_grid
-from tactbench.rigs.twin.synthesis import Settled, Synthesis
+from tactbench.rigs.twin.synthesis import FINE, RUNGS, Settled, Synthesis
 
 if TYPE_CHECKING:
     from tactbench.rigs.twin.contact.tangential import SlideTable

@@ -7,6 +7,7 @@ change of the readings if the effect is left out.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from tactbench.plugin import ChannelKind, Quantity, Scene, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
@@ -86,7 +87,7 @@ def shear(scene: Scene, sensor: SensorSpec) -> Reason:
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
         return _no("no observed channel responds to tangential motion of the skin")
-    slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
+    slides = "; the slide drags it" if _slides(scene).called_for else ""
     return _under_load(scene, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
 
 
@@ -211,7 +212,7 @@ def force_filter(scene: Scene, sensor: SensorSpec) -> Reason:
 # Sliding.
 
 
-def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
+def _slides(scene: Scene) -> Reason:
     slide = scene.slide
     if slide is None:
         return _no("no tangential motion: the scene does not slide")
@@ -223,7 +224,7 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def friction(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes friction: a loaded surface moves over the skin."""
-    found = _slides(scene, sensor)
+    found = _slides(scene)
     if scene.slide is None or not found.called_for:
         return found
     surface = scene.slide.surface
@@ -234,7 +235,7 @@ def friction(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes a vibration of the skin under a sliding rough surface."""
-    found = _slides(scene, sensor)
+    found = _slides(scene)
     if not found.called_for or scene.slide is None:
         return found
     surface = scene.slide.surface
@@ -257,17 +258,7 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 # Heat.
 
 
-def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Decide whether the scene includes steady temperature: a thermistor in the spec gives an observed channel."""
-    return _thermistor(scene, sensor, "dc_temperature", THERMISTOR)
-
-
-def ac_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Decide whether the scene includes changing temperature: a thermistor in the spec gives an observed channel."""
-    return _thermistor(scene, sensor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
-
-
-def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tuple[str, ...]) -> Reason:
+def _thermistor(kind: ChannelKind, needed: tuple[str, ...], scene: Scene, sensor: SensorSpec) -> Reason:
     if kind not in scene.observe:
         return _no(NOT_OBSERVED)
     missing = [name for name in (*needed, *NEEDED) if name not in sensor.parameters]
@@ -275,6 +266,12 @@ def _thermistor(scene: Scene, sensor: SensorSpec, kind: ChannelKind, needed: tup
         return _no(f"the spec states no {', '.join(missing)}")
     rise = sensor.parameters["heater_power"].to("W") * sensor.parameters["heat_resistance"].to("K/W")
     return Reason(True, f"an observed channel reads a core that its heater keeps {rise:.0f} K above the room")
+
+
+dc_temperature = partial(_thermistor, "dc_temperature", THERMISTOR)
+"""Function that decides whether the scene includes steady temperature: a thermistor gives an observed channel."""
+ac_temperature = partial(_thermistor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
+"""Function that decides whether the scene includes changing temperature: a thermistor gives an observed channel."""
 
 
 def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -37,7 +37,7 @@ def gain(run: Synthesis) -> None:
         numbers = run.of_every_channel(track, kind, run.of_unit("gain", kind))
         track.gain[columns] += nuisances.gain_scatter.to("1") * numbers
         if nuisances.unit_gain is not None and not run.scene.first_unit:
-            shared = float(run.of_unit("shared gain", kind).standard_normal())
+            shared = run.of_unit("shared gain", kind).standard_normal()
             stated = f"{nuisances.unit_gain.to('%'):g} % (sd, {nuisances.unit_gain.source.tag})"
             run.drawn["remark unit gain"] = f"units beside 1 are drawn: gains of {kind} channels differ by {stated}"
             track.gain[columns] *= max(1.0 + nuisances.unit_gain.to("1") * shared, 0.0)
@@ -79,7 +79,7 @@ def offset(run: Synthesis) -> None:
     """Add random offsets: one common to all channels of a recording, one of each channel, and those of a session."""
     environment = run.scene.environment
     for track, kind, columns, nuisances in _stated(run):
-        shared = nuisances.offset_shared.value * float(run.of_recording("offset", "shared", kind).standard_normal())
+        shared = nuisances.offset_shared.value * run.of_recording("offset", "shared", kind).standard_normal()
         own = nuisances.offset_own.value * _own_offsets(run, track, kind, nuisances)
         session = run.of_every_channel(track, kind, run.of_session("offset", kind))
         track.readings[:, columns] += environment.scale_of_offsets * (shared + own)
@@ -118,17 +118,13 @@ def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
     x, y, z = np.array(places, dtype=np.float64).T
     round_finger = spec.skin is not None and spec.skin.sheet.outer_radius is not None
     across = np.arctan2(y, -z) if round_finger else y
-    u, v = (_scaled(one) for one in (x, across))
+    # Within -1 to 1, so that squares of metres are not lost; 0 if all are equal.
+    u, v = (one - (one.max() + one.min()) / 2 for one in (x, across))
+    u, v = (one / (np.abs(one).max() or 1.0) for one in (u, v))
     columns = np.stack([u, v, u * u, u * v, v * v], axis=1)
     columns -= columns.mean(axis=0)
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
     return left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)]
-
-
-def _scaled(values: FloatArray) -> FloatArray:
-    """Return values shifted and scaled to within -1 to 1, so that squares of metres are not lost; 0 if all equal."""
-    about = values - (values.max() + values.min()) / 2
-    return np.asarray(about / (np.abs(about).max() or 1.0))
 
 
 def warm_up(run: Synthesis) -> None:

@@ -33,7 +33,9 @@ def contact_heat(run: Synthesis) -> None:
     if core is None or indenter is None or conductivity is None:
         return
     for track in run.tracks:
-        conductance = disc_conductance_w_per_k(round_contact_mm(run, track.force_n), conductivity.to("W/m/K"))
+        # From an isothermal disc of radius a into a half-space: 4 k a (Carslaw and Jaeger 1959, Conduction of heat in
+        # solids, chapter 8).
+        conductance = 4e-3 * conductivity.to("W/m/K") * round_contact_mm(run, track.force_n)
         track.warmth_k = core.warmth(run.scene, track.t_s, conductance, indenter.to("degC"))
 
 
@@ -162,14 +164,6 @@ class HeatedCore:
         return self.room_c + recurrence(np.exp(exponent), drive)
 
 
-def disc_conductance_w_per_k(radius_mm: FloatArray, conductivity_w_per_m_k: float) -> FloatArray:
-    """Return ``4 k a``, the thermal conductance from an isothermal disc of radius a into a half-space.
-
-    Carslaw and Jaeger 1959, Conduction of heat in solids, chapter 8; without a contact it is 0.
-    """
-    return 4e-3 * conductivity_w_per_m_k * radius_mm
-
-
 def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatArray:
     """Return the conductivity of an electrolyte relative to that at 25 degC: ``1 + alpha (T - 25)``.
 
@@ -202,5 +196,5 @@ class Thermistor:
     def reading(self, degc: FloatArray) -> FloatArray:
         """Return the readings [count] at temperatures [degC]: full scale times ``p / (exp(b/T) + q)``, T in kelvin."""
         # Above absolute zero by a kelvin: colder than that, the exponential overflows.
-        kelvin = np.maximum(np.asarray(degc, dtype=np.float64) + _ICE_K, 10.0)
+        kelvin = np.maximum(degc + _ICE_K, 10.0)
         return self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q)

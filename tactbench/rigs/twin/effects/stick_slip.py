@@ -109,12 +109,9 @@ class Dragged:
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
         return drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness
 
-    def _add(self, t_s: float, kind: int, x_mm: float, about_mm: float = 0.0, friction: float = 0.0) -> None:
-        self._phases.append((t_s, kind, x_mm, about_mm, friction))
-
     def _run(self) -> None:
         drive = self.drive
-        self._add(-math.inf, REST, 0.0)
+        self._phases.append((-math.inf, REST, 0.0, 0.0, 0.0))
         end = min(drive.end_s, float(drive.t_s[-1]))
         t, x, since = drive.start_s, 0.0, 0.0
         sliding = bool(np.interp(t, drive.t_s, drive.load_n) <= _LEAST_LOAD_N)
@@ -124,7 +121,7 @@ class Dragged:
                 sliding, since = False, x
                 continue
             since = x
-            self._add(t, STICK, x)
+            self._phases.append((t, STICK, x, 0.0, 0.0))
             t, x = self._lets_go(t, x, end)
             if t >= end:
                 break
@@ -133,11 +130,11 @@ class Dragged:
             sliding = math.isinf(lasting)
             if sliding:
                 lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
-            self._add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
+            self._phases.append((t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic))))
             lasting = min(lasting, end - t)
-            u = deflection_after(drive.mode, x - about, drive.speed_mm_s, lasting)
+            u, _ = swing(drive.mode, x - about, drive.speed_mm_s, lasting)
             # A slip of no length at all would let go again at the same moment, for ever.
-            t, x = max(t + lasting, math.nextafter(t, math.inf)), about + u
+            t, x = max(t + lasting, math.nextafter(t, math.inf)), about + float(u)
             since = x
         if drive.end_s < drive.t_s[-1]:
             self._hold(max(t, drive.start_s), x, since)
@@ -171,7 +168,7 @@ class Dragged:
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
         deflection = bristle(knots, drive.speed_mm_s, limit, x, most)
-        self._add(t, SLIDE, x)
+        self._phases.append((t, SLIDE, x, 0.0, 0.0))
         self._x_t.append(knots)
         self._x_mm.append(deflection)
         return until, float(deflection[-1])
@@ -179,7 +176,7 @@ class Dragged:
     def _hold(self, t: float, x: float, since: float) -> None:
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
-        self._add(t, HELD, x, since)
+        self._phases.append((t, HELD, x, since, 0.0))
         self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
         now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
         held = np.concatenate([[now], self._release_mm[first:]])
@@ -205,9 +202,7 @@ class Dragged:
         force[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]) + viscous_mm)
 
         own = kind == SLIP
-        u, velocity = swing(
-            drive.mode, x0[own] - about[own], np.full(int(own.sum()), drive.speed_mm_s), t_s[own] - begin[own]
-        )
+        u, velocity = swing(drive.mode, x0[own] - about[own], drive.speed_mm_s, t_s[own] - begin[own])
         x[own] = about[own] + u
         slip[own] = drive.speed_mm_s - velocity
         force[own] = self._friction[phase[own]] * load[own]
@@ -302,8 +297,10 @@ class Mode:
         return self.omega * math.sqrt(1.0 - self.damping**2)
 
 
-def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) after a slip began at `u`, `speed`."""
+def swing(
+    mode: Mode, u: FloatArray | float, speed: float, after_s: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) after a slip began at `u` (n,)."""
     w, r = mode.swing, mode.decay
     c, s = np.cos(w * after_s), np.sin(w * after_s)
     faded = np.exp(-r * after_s)
@@ -313,18 +310,12 @@ def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> 
     )
 
 
-def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
-    """Return the deflection of :func:`swing` at one moment, without arrays because it is computed once per slip."""
-    w, r = mode.swing, mode.decay
-    return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
-
-
 def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
     """Return (n,) True where the skin, in a slip that begins at `u` (n,), reaches the surface's speed again."""
     w, r = mode.swing, mode.decay
     back = (mode.omega**2 * u + r * speed) / w
     highest = np.arctan2(r * speed + back * w, r * back - speed * w) + math.pi
-    _, velocity = swing(mode, u, np.full_like(u, speed), highest / w)
+    _, velocity = swing(mode, u, speed, highest / w)
     return (u > 0) & (velocity >= speed)
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, Scene
-from tactbench.plugin.devices import LoopModel
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, force_at_depth
 from tactbench.rigs.twin.preparation import prepare
@@ -40,23 +39,6 @@ def pressed(sensors):
 
 def _unfiltered(**more):
     return ForceLoop(cutoff=None, **more)
-
-
-def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed):
-    run = pressed(_scene(_unfiltered()), "force-loop")
-    limit = LoopModel.of(_unfiltered(), 0.012).largest_stiffness()
-    table = bare_skin(run, BEYOND * 5.0)
-    loads = np.linspace(0.0, 5.0, 501)
-    stiffness = np.gradient(loads, table.skin(loads).depth_mm)
-    critical = float(np.interp(limit, stiffness, loads))
-    wanted = np.interp(run.t_s, [0, 2, 30], [0, 0, 5])
-    ripple = np.abs(np.diff(run.load.force_n, 2))
-    assert 1.0 < critical < 4.0
-    # Rounding of the force to 0.02 N goes round a loop of gain below one and a half.
-    assert ripple[wanted[1:-1] < 0.9 * critical].max() < 0.05
-    began = wanted[1:-1][np.argmax(ripple > 0.5)]
-    # It needs some swings to grow to that, and the ramp goes on for them.
-    assert critical < began < 1.2 * critical
 
 
 def test_everybody_follows_the_load_of_the_loop(pressed):
