@@ -37,7 +37,7 @@ FOR_PEOPLE = ("table", "md", "latex")
     click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
                  help="Output format. Default: table, or the format of the suffix of --to."),
     click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-                 help="Write a file: .txt, .md, .csv, .json, .tex."),
+                 help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx."),
 )  # fmt: skip
 def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,

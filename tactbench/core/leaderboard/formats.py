@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import io
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +19,10 @@ from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
 from tactbench.core.tables import terminal
 from tactbench.core.tables.latex import latex as latex_of
 from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text import csv_text, json_text
+from tactbench.core.tables.text import csv_text, in_a_field, json_text, visible
 
-SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table"}
+SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table",
+            ".parquet": "parquet", ".xlsx": "xlsx"}  # fmt: skip
 """Output format by suffix of the file."""
 _IN_A_PAPER = ("place", "sensor", "estimator", "score", "notes", "interval", "range", "against reference", "published")
 
@@ -42,7 +46,14 @@ def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: in
     ----------
     columns, width
         Columns and width [characters] of formats for people; formats for programs hold all columns.
+
+    Raises
+    ------
+    UsageError
+        If the library for Parquet or Excel files is not installed.
     """
+    if shape in ("parquet", "xlsx"):
+        return parquet(table) if shape == "parquet" else xlsx(table)
     if shape == "table":
         text = terminal.plain_text(document(table, columns), width)
     elif shape == "md":
@@ -89,8 +100,48 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
 
 def csv_of(table: Table) -> str:
     """Return a table as CSV with one line for each record: all keys, and the texts shown in columns ``shown_…``."""
+    return csv_text(*_flat(table))
+
+
+def _flat(table: Table) -> tuple[list[str], list[list[Any]]]:
+    """Return the names of the columns, and the lines, with lists and mappings as JSON."""
     names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
-    return csv_text(names, ([*row.values(), *shown.values()] for row, shown in records(table)))
+    return names, [[*map(_field, row.values()), *shown.values()] for row, shown in records(table)]
+
+
+def _field(value: Any) -> Any:
+    return visible(value) if isinstance(value, str) else in_a_field(value)
+
+
+def parquet(table: Table) -> bytes:
+    """Return the columns of CSV, typed, as a Parquet file; raises UsageError without pyarrow."""
+    arrow, writer = (_library(name, "parquet") for name in ("pyarrow", "pyarrow.parquet"))
+    names, lines = _flat(table)
+    out = io.BytesIO()
+    writer.write_table(arrow.table({name: [line[place] for line in lines] for place, name in enumerate(names)}), out)
+    return out.getvalue()
+
+
+def xlsx(table: Table) -> bytes:
+    """Return the lines of CSV as a sheet of an Excel workbook; raises UsageError without openpyxl."""
+    book = _library("openpyxl", "xlsx").Workbook(write_only=True)
+    sheet = book.create_sheet("leaderboard")
+    names, lines = _flat(table)
+    for line in (names, *lines):
+        sheet.append([None if isinstance(one, float) and not math.isfinite(one) else one for one in line])
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+def _library(name: str, extra: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise UsageError(
+            f"A file .{extra} needs {name}, which cannot be imported: {error}.",
+            hint=f"Install it with `pip install 'tactbench[{extra}]'`.",
+        ) from error
 
 
 def json_array(table: Table) -> str:

@@ -65,7 +65,10 @@ def csv_text(names: Iterable[str], lines: Iterable[Iterable[Any]]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(names)
-    writer.writerows(
-        [json_text(value) if isinstance(value, list | tuple | dict) else value for value in line] for line in lines
-    )
+    writer.writerows([in_a_field(value) for value in line] for line in lines)
     return out.getvalue()
+
+
+def in_a_field(value: Any) -> Any:
+    """Return a list or a mapping as JSON, any other value as it is."""
+    return json_text(value) if isinstance(value, list | tuple | dict) else value

@@ -22,7 +22,8 @@ def written(shape, rows):
     return rendered(build_table(rows), shape)
 
 
-def test_json_and_csv_hold_the_cells_of_the_table():
+def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table():
+    openpyxl, parquet = pytest.importorskip("openpyxl"), pytest.importorskip("pyarrow.parquet")
     rows = hostile_rows()
     table = build_table(rows)
     names = [SHOWN[name] for name in COLUMNS]
@@ -33,6 +34,12 @@ def test_json_and_csv_hold_the_cells_of_the_table():
     ]
     of_csv = list(csv.DictReader(io.StringIO(written("csv", rows).decode(), newline="")))
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
+    of_parquet = parquet.read_table(io.BytesIO(written("parquet", rows))).to_pylist()
+    assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_parquet] == lines
+    assert [entry["score"] for entry in of_parquet] == [entry["score"] for entry in of_json]
+    header, *sheet = openpyxl.load_workbook(io.BytesIO(written("xlsx", rows))).active.iter_rows(values_only=True)
+    assert header == tuple(of_csv[0])
+    assert [line[header.index("score")] for line in sheet] == [entry["score"] for entry in of_json]
 
 
 def test_latex_has_a_column_of_dashes_where_no_answer_is_better_than_the_trivial_one():
