@@ -135,3 +135,10 @@ def test_a_copy_is_monotone_and_at_most_five_rows_late(values, late, copied):
     assert not is_copy(one, other, np.arange(3000))  # no two rows of one recording
     other[1500:1510] = np.random.default_rng(1).permutation(other[1500:1510])
     assert not is_copy(one, other)
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_stream_without_rows_is_empty(write, rows):
+    with open_recording(write(READINGS[:rows], force=np.zeros(rows), t_ns=TIMES[:rows])) as recording:
+        found = [one.stream for one in examine(recording) if one.check == "empty"]
+    assert found == ([] if rows else ["taxels", "force_torque"])

@@ -123,3 +123,10 @@ def test_lags_and_uncertainties_are_those_that_were_looked_at(given, beginning, 
     found = find_lag(*clocked(**given))
     for one, expected in ((found.beginning, beginning), (found.middle, middle), (found.end, end)):
         assert one == pytest.approx(expected, rel=1e-3)
+
+
+def test_without_channels_or_with_few_rows_there_is_no_lag():
+    sensor_ns, sensor, force_ns, force = clocked(lag=0.25)
+    assert find_lag(sensor_ns, sensor[:, :0], force_ns, force) is None
+    assert find_lag(sensor_ns, sensor, force_ns, force[:, :0]) is None
+    assert find_lag(sensor_ns[:99], sensor[:99], force_ns, force) is None

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from tactbench.core import spec
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.row import FORMAT, NESTED
-from tactbench.core.spec.scene import NUISANCES
+from tactbench.core.spec.scene import NUISANCES, RANGES
 
 FILE = Path(__file__).parent / "fields.txt"
 MODULES = [importlib.import_module(f"{spec.__name__}.{one.name}") for one in pkgutil.iter_modules(spec.__path__)]
@@ -48,6 +48,7 @@ def declared():
                 if bounds or own:
                     found.append(" ".join([f"{name}.{field}", *bounds, *([f"= {info.default}"] if own else [])]))
     found += [f"nuisance {name}: {'.'.join(way)} in {unit}" for name, (way, unit) in NUISANCES.items()]
+    found += [f"range of {name}: {one}" for name, one in RANGES.items()]
     for key, types in FORMAT.items():
         found.append(f"row {key}: {', '.join(sorted(one.__name__ for one in types))}{', nested' * (key in NESTED)}")
     return "\n".join([*dict.fromkeys(found), ""])

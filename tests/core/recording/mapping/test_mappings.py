@@ -120,6 +120,30 @@ def test_an_archive_of_arrays(tables, name, count, first):
     assert meta.labels == {"slip": "yes", "block": "1"}
 
 
+@pytest.mark.parametrize(
+    ("shape", "axes"),
+    [
+        ((3, 1, 2), ["recording", "row", "channel"]),
+        ((4, 2), ["row", "channel"]),
+        ((3, 4, 1), ["recording", "row", "channel"]),
+    ],
+)
+@pytest.mark.parametrize("name", ["npz", "mat"])
+def test_axes_of_length_1_and_axes_that_are_left_out(tables, name, shape, axes):
+    X = np.arange(np.prod(shape)).reshape(shape)
+    np.savez(tables.data / "x.npz", X=X)
+    scipy.io.savemat(tables.data / "x.mat", {"X": X})
+    report = tables.run(
+        clock="none", recording={"name": "r{index}", "session": "s"},
+        tables={"table": {"files": f"x.{name}", "read": {"format": name, "array": "X", "axes": axes}}},
+        streams={"taxels": {"table": "table", "channels": [
+            {"columns": [*range(shape[-1])], "name": "t{column}", "kind": "taxel", "unit": "count"}]}},
+    )  # fmt: skip
+    whole = X if len(shape) == 3 else X[None]
+    assert len(report.recordings) == len(whole)
+    assert np.array_equal(read(report, len(whole) - 1)[1]["taxels"].data, whole[-1])
+
+
 NPY = """
 clock: none
 tables:
