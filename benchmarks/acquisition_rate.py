@@ -30,6 +30,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -198,14 +199,14 @@ def synthetic(load: str) -> Iterator[tuple[dict[str, Driver], subprocess.Popen[s
 @contextmanager
 def of_rig_file(path: Path, sensor: str) -> Iterator[tuple[dict[str, Driver], Clock]]:
     """Yield the drivers of a rig file's sensor and force sensor, and their clock; emulated ones are at rest."""
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+    from tactbench.devices.emulation.real_time import RealTimeDevices
     from tactbench.devices.rig_devices import drivers_of, emulators_of
 
     file = load_yaml(path, RigFile)
     registry = load_registry()
     devices = emulators_of(file, registry, sensor, lambda t_s: {})
-    with EmulatedDevices(devices, time="real") as emulated, ExitStack() as opened:
-        openers = {name: emulated.opener(name) for name in devices}
+    with RealTimeDevices(devices) as emulated, ExitStack() as opened:
+        openers = {name: partial(open_link, emulated.addresses[name], emulated.clock) for name in devices}
         drivers = drivers_of(file, registry, sensor, openers, emulated.clock)
         for driver in drivers.values():
             opened.enter_context(driver)

@@ -28,6 +28,7 @@ from tactbench.plugin.devices import (
     DriverSettings,
     EmulatedDevice,
     EmulatedDevices,
+    EmulatorSettings,
     GuardState,
     LocalGuard,
     largest_force_n,
@@ -61,8 +62,9 @@ class Machine(faults.Pressed):
         own = {"motor": self.devices._devices["motor"], "force": self.devices._devices["force"]}
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
-            self.rails[name] = MotorEmulator(None, rng, faults.build_options(), faults=given.get(name, []))
-            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())), 115200)
+            self.rails[name] = MotorEmulator(EmulatorSettings(lambda at_s: {}, rng, RAIL))
+            self.rails[name].faults = given.get(name, [])
+            own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())))
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock
 
@@ -147,7 +149,7 @@ def schedule(setting: Any, drawn: tuple[tuple[str, float], ...], obstacle_m: flo
         elif what == "hot":
             given.setdefault(axis, []).append(MotorFault.parse(f"motor-fault:start_s={at_s}"))
         elif what == "answers late":
-            given.setdefault(axis, []).append(MotorFault.parse(f"late-answers:start_s={at_s}"))
+            given.setdefault(f"{axis}_link", []).append(LinkFault.parse(f"late:start_s={at_s},delay_s=0.25"))
         elif (kind := faults.KINDS[name]).text:
             text = kind.text.format(start=at_s, end=at_s + 0.3, four=at_s + 4.5e-3)
             parse = faults.DatagramFault.parse if kind.where == "force" else LinkFault.parse

@@ -20,6 +20,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tactbench.devices.emulation.real_time import RealTimeDevices
 from tactbench.devices.guard_messages import GuardRefusesError, Report, Trigger
 from tactbench.plugin.devices import (
     Beat,
@@ -136,12 +137,10 @@ class Pressed:
         self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
         self.sensed: Callable[[list[float], float], list[float]] = lambda wrench, at_s: wrench
         rng = np.random.default_rng(setting.seed)
-        self.motor = ListeningMotor(
-            self._load,
-            np.random.default_rng(setting.seed + 1),
-            build_options(setting.baud),
-            faults=faults.get("motor", []),
-        )
+        own = np.random.default_rng(setting.seed + 1)
+        self.motor = ListeningMotor(EmulatorSettings(lambda at_s: {}, own, {**STATED, "baud": setting.baud}))
+        self.motor.press_against(self._load)
+        self.motor.faults = faults.get("motor", [])
 
         def wrench(at_s: float) -> list[float]:
             self._places.append((at_s, self.position_m))
@@ -153,19 +152,17 @@ class Pressed:
             EmulatorSettings(lambda at_s: dict(zip(AXES, wrench(at_s), strict=True)), rng, options)
         )
         self.force.faults = faults.get("force", [])
-        self.devices = EmulatedDevices(
-            {
-                "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
-                "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
-            },
-            time=setting.time,
-        )
+        devices = {
+            "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ()))),
+            "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
+        }
+        self.devices = RealTimeDevices(devices) if setting.time == "real" else EmulatedDevices(devices)
         self.clock = self.devices.clock
 
     @property
     def position_m(self) -> float:
         """Of the motor, as its drive counts it."""
-        return float(self.motor.drive.position_m) + RETREAT_M
+        return float(self.motor.position_m)
 
     @property
     def force_n(self) -> float:
@@ -179,7 +176,7 @@ class Pressed:
         return max((place for at_s, place in self._places if at_s >= since_s), default=-math.inf)
 
     def _load(self, place_m: float) -> float:
-        return self.setting.stiffness_n_m * max(0.0, place_m + RETREAT_M - SKIN_M)
+        return self.setting.stiffness_n_m * max(0.0, place_m - SKIN_M)
 
     def settings(self) -> dict[str, dict[str, Any]]:
         """Return the options of both devices."""
@@ -195,13 +192,6 @@ class Pressed:
         )
         force = force_driver(DriverSettings(self.devices.opener("force"), options=options["force"], clock=self.clock))
         return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance, kept=kept)
-
-
-def build_options(baud: int = 115200) -> Any:
-    """Return the options of the drive."""
-    from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-
-    return FaulhaberOptions(**STATED, baud=baud)
 
 
 @dataclass
@@ -311,7 +301,7 @@ KINDS: dict[str, Kind] = {
     "force held up": Kind("force_link", FORCE_UNKNOWN, "late:start_s={start},delay_s=0.05"),
     "motor hot": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start}", out=False),
     "motor hot for a while": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start},end_s={end}", out=False),
-    "motor answers late": Kind("motor", SILENT, "late-answers:start_s={start}"),
+    "motor answers late": Kind("motor_link", SILENT, "late:start_s={start},delay_s=0.25"),
     "motor's lines garbled": Kind(
         "motor", SILENT | {Trigger.COMMANDS_REFUSED},
         "garbled-line:start_s={start},every=11",

@@ -163,7 +163,7 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
             numbers |= {who: said[0][who] for who in ("guard", "sibling")}
             time.sleep(rng.uniform(0.0, 0.4))
             now_s, deepest_m = 1e-9 * world.clock(), world.position_m
-            target_m = world.motor.drive.target_m + faults.RETREAT_M
+            target_m = world.motor.drive.target_m
             for who in scenario.who:
                 os.kill(numbers[who], scenario.number)
             late_s, host_late_s, out = _watched(world, now_s, 3.0 if scenario.retreats else 0.5)

@@ -16,7 +16,6 @@ import numpy as np
 from tactbench.plugin.devices import EmulatorSettings
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
-    DatagramError,
     decode_records,
     encode_record,
     encode_request,
@@ -52,7 +51,7 @@ def main(count: int, seed: int) -> None:
         assert drive.feed(b"\rLA1000\r")[-1].argument == 1000
     print(f"motor, codec: {commands} commands")
 
-    motor, now_s = MotorEmulator(lambda _x: 0.0, rng), 0.0
+    motor, now_s = MotorEmulator(EmulatorSettings(lambda _t: {}, rng)), 0.0
     for piece in pieces[: len(pieces) // 20 + 1]:
         motor.feed(piece, now_s)
         now_s += 1.1
@@ -65,13 +64,14 @@ def main(count: int, seed: int) -> None:
             box.feed(piece[start:end], 0.0)
             try:
                 whole += len(decode_records(piece[start:end]))
-            except DatagramError:
+            except ValueError:
                 rejected += 1
         assert decode_records(encode_record(5, 0, 0, (0,) * 6))["rdt_sequence"] == 5
     print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected")
 
     for name, load in (("free", 0.0), ("pressing", 5000.0)):
-        motor = MotorEmulator(lambda x, k=load: k * max(x, 0.0), rng)
+        motor = MotorEmulator(EmulatorSettings(lambda _t: {}, rng))
+        motor.press_against(lambda x, k=load: k * max(x, 0.0))
         motor.feed(b"EN\rLA300\rM\r", 0.0)
         begin = time.perf_counter()
         for n in range(1000):

@@ -21,5 +21,5 @@ def reference() -> str:
     """Return the whole document."""
     sensors = load_registry().sensors
     specs = [sensors[name].spec for name in ("biotac", "icub", "ideal")]
-    tables = markdown([sensor_table(one.title, [one], quantities([one]), with_source=True) for one in specs])
+    tables = markdown([sensor_table(one.title, [one], quantities, with_source=True) for one in specs])
     return _TITLE + tables.replace("### ", "## ")

@@ -21,7 +21,7 @@ Generated from the docstrings. How plugins are written: [plugins](plugins.md).
 _MANIPULATOR = "tactbench.rigs.parallel_manipulator"
 RIG_FILES = {
     "Every rig file": ("tactbench.core.spec.rig_file",),
-    "Options of the BioTac": ("tactbench.sensors.biotac.options",),
+    "Options of the BioTac": ("tactbench.sensors.biotac.frames",),
     "Options of the iCub fingertip": ("tactbench.sensors.icub.options",),
     "Options of net-ft": (f"{_MANIPULATOR}.force_torque.net_ft.codec",),
     "Options of every axis": ("tactbench.devices.positioner",),

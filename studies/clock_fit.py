@@ -23,8 +23,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.recording.clock_fit import STRETCH_NS, ClockFit, HostTimes
-from tactbench.core.spec.recording import StreamClock
+from tactbench.core.recording.clock_fit import STRETCH_NS, fit, host_times
 
 Times = npt.NDArray[np.int64]
 Delays = Callable[[np.random.Generator, npt.NDArray[np.float64]], npt.NDArray[np.float64]]
@@ -83,11 +82,8 @@ def one_run(
     device, true = clocks(rng, seconds, rate_hz, wander_ppm, period_s)
     t_s = (device - device[0]) * 1e-9
     came = true + np.rint(delays(rng, t_s) * 1e9).astype(np.int64)
-    fit = ClockFit(stretch_ns=stretch_ns)
-    for cut in np.array_split(np.arange(len(device)), max(1, len(device) // 500)):
-        fit.add(device[cut], came[cut])
-    segments = fit.segments()
-    given = HostTimes(StreamClock(source="device", segments=segments))(device)
+    segments = fit(device, came, stretch_ns)
+    given = host_times(segments, device)
     bounds = [segment.bound_ns for segment in segments if segment.bound_ns is not None]
     late_s = (came - true + (true - device) - (true[0] - device[0])) * 1e-9
     line = np.polynomial.Polynomial.fit(t_s, late_s, 1)(t_s)

@@ -23,7 +23,7 @@ from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.names import grouped
-from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of, with_declared
+from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of
 from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.plan import cell_of
@@ -37,7 +37,6 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
 from tactbench.core.study.results import opened, shown_rows, table_of
-from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
@@ -161,7 +160,7 @@ class Results(Rows):
         unknown = UnknownNameError("row", a, ())
         for rows in grouped(self.table.rows, lambda row: row.get("data")).values():
             try:
-                found += with_declared(comparisons(rows, a, b, task), rows, matrix_called().comparisons)
+                found += comparisons(rows, a, b, task)
             except UnknownNameError as error:
                 unknown = error
         if not found:

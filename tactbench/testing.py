@@ -14,15 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cache, partial
 from pathlib import Path
 
-from tactbench.core.conformance.check import CheckFailed, CheckOutcome, Mode, Subject
+from tactbench.core.conformance.check import CheckFailed, CheckOutcome, Subject
 from tactbench.core.conformance.run import CheckReport, checks_of, run_checks, subjects_named
 from tactbench.core.plugins.registry import installed
 
 __all__ = ["CheckFailed", "CheckReport", "PluginCheck", "check_plugin", "plugin_checks"]
-MODES: tuple[Mode, ...] = ("passive", "recording")
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,9 @@ class PluginCheck:
             raise CheckFailed(outcome.where, "\n".join(filter(None, (outcome.text, outcome.advice))))
 
 
-@lru_cache(maxsize=64)
+@cache
 def _report(subject: Subject, recording: Path | None) -> CheckReport:
-    return run_checks(subject, modes=MODES if recording else MODES[:1], recording=recording)
+    return run_checks(subject, recording=recording)
 
 
 def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginCheck]:
@@ -70,7 +69,7 @@ def plugin_checks(name: str, *, recording: Path | None = None) -> list[PluginChe
     return [
         PluginCheck(f"{subject.kind}-{one.name}", partial(_report, subject, recording))
         for subject in subjects_named(installed(), name)
-        for one in checks_of(subject.kind, *(MODES if recording else MODES[:1]))
+        for one in checks_of(subject.kind)
     ]
 
 

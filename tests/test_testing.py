@@ -14,7 +14,7 @@ ASKED = testing.plugin_checks("ols")
 
 
 def test_all_checks_of_a_kind_are_handed_to_pytest_by_name():
-    assert [str(one) for one in ASKED] == [f"estimator-{one.name}" for one in checks_of("estimator", "passive")]
+    assert [str(one) for one in ASKED] == [f"estimator-{one.name}" for one in checks_of("estimator")]
     ASKED[0]()
 
 
@@ -36,7 +36,7 @@ def test_a_report_raises_nothing_and_a_wrong_name_does():
 )
 def test_what_came_of_a_check_is_pytests(status, raised):
     outcome = CheckOutcome("it-learns", status, "predict", "it does not")
-    check = PluginCheck("estimator-it-learns", lambda: CheckReport("estimator", "x", ("passive",), (outcome,)))
+    check = PluginCheck("estimator-it-learns", lambda: CheckReport("estimator", "x", (outcome,)))
     if raised is None:
         check()
         return

@@ -21,9 +21,9 @@ from tactbench.plugin import (
     load_registry,
 )
 from tactbench.plugin.simulation import FluidBackedShell, rig_context
-from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.shell import with_core
 from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build
 

@@ -127,7 +127,7 @@ class DuplicateNameError(PluginError):
         both = " and ".join(distributions)
         super().__init__(
             f"The {kind} {name!r} is defined by {both}; neither definition is used.",
-            hint="Uninstall one of the distributions, or ask its author to rename the {kind}.",
+            hint=f"Uninstall one of the distributions, or ask its author to rename the {kind}.",
         )
 
 

@@ -55,21 +55,47 @@ def hdf5_image(fill: Callable[[Any], None]) -> bytes:
     return image
 
 
-def replace_file(path: Path, content: bytes) -> None:
-    """Write `content` to a temporary file, sync it and rename it to `path`: readers see either the old or the new file.
+def replace_file(
+    path: Path,
+    content: bytes,
+    *,
+    aside: Path | None = None,
+    check: Callable[[Path], None] = lambda _aside: None,
+    sync: bool = True,
+) -> None:
+    """Write `content` to a temporary file and rename it to `path`: readers see either the old or the new file.
 
-    Raises OSError if the folder cannot be written; in this case, no partial file remains.
+    Parameters
+    ----------
+    aside
+        Path of the temporary file in the same folder; None: a hidden file. After an error, it does not remain.
+    check
+        Function called with the temporary path before the renaming; its errors prevent the renaming.
+    sync
+        True: wait until the disk has stored the file.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
     """
-    aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    aside = aside or path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         with aside.open("wb") as file:
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            if sync:
+                os.fsync(file.fileno())
+        check(aside)
         aside.replace(path)
-    except BaseException:
+        if sync and os.name != "nt":  # folders cannot be opened there
+            folder = os.open(path.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+    finally:
         aside.unlink(missing_ok=True)
-        raise
 
 
 @contextmanager

@@ -61,12 +61,10 @@ class ForceWatch:
         Check of the samples' numbers for lost, late and duplicated samples.
     force_n
         Pressing force [N], less the zero, of the newest sample; NaN: no sample yet, or no limits.
-    sequence, t_ns
-        Number and time of receipt [ns] of the newest sample; -1 and 0: no sample yet.
+    received, t_ns
+        Number of samples so far, and time of receipt [ns] of the newest.
     changed
-        Number of the newest sample that differs from the previous sample in any channel; -1: none yet.
-    received
-        Number of samples so far.
+        Number of samples up to the newest that differs from the previous sample in any channel.
     """
 
     def __init__(self, stream: StreamSpec) -> None:
@@ -75,7 +73,7 @@ class ForceWatch:
         self.blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
         self.order = SequenceCheck()
         self.force_n = math.nan
-        self.sequence, self.t_ns, self.changed, self.received = -1, 0, -1, 0
+        self.received = self.t_ns = self.changed = 0
         self._delay_ns = 0
         self._offsets: deque[tuple[int, int]] = deque(maxlen=2)
         self._last = np.full((1, kinds.size), math.nan)
@@ -119,8 +117,10 @@ class ForceWatch:
         travelling
             True if the force ceiling of travel applies, False for that of pressing.
         """
+        lost = -self.order.gaps
         newer = self.order(block)
-        lost, same = (0, self._same) if newer is None else self._take_newer(newer)
+        lost += self.order.gaps
+        same = self._same if newer is None else self._take_newer(newer)
         if limits is None or not len(block.data):
             return None
         zero = np.array(limits.zero)
@@ -130,7 +130,7 @@ class ForceWatch:
         wrenches = block.data - zero
         problem = _unknown(wrenches, block) or self._too_large(wrenches, limits, travelling)
         if problem is None and lost > limits.lost_samples:
-            problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, limit {limits.lost_samples}"
+            problem = Trigger.FORCE_GAP, f"{lost} force samples are missing in one reading, limit {limits.lost_samples}"
         if problem is None and same >= limits.same_samples:
             problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are equal in every channel"
         if problem is not None:
@@ -139,26 +139,23 @@ class ForceWatch:
             self._sound.extend(zip(newer.t_ns.tolist(), limits.pressing_n(newer.data).tolist(), strict=True))
         return problem
 
-    def _take_newer(self, block: Block) -> tuple[int, int]:
-        """Update numbers and times; return the largest numbers of samples lost, and of samples equal, in a row."""
+    def _take_newer(self, block: Block) -> int:
+        """Update numbers and times; return the largest number of samples equal in a row."""
         self.blocks.append(block)
         rows = block.data
-        numbers = self.sequence + 1 + np.arange(len(rows)) if block.sequence is None else block.sequence
-        lost = int(np.diff(numbers, prepend=self.sequence if self.received else numbers[0] - 1).max()) - 1
         longest = 0
         repeats = (rows == np.concatenate((self._last, rows[:-1]))).all(axis=1)
-        for number, repeated in zip(numbers.tolist(), repeats.tolist(), strict=True):
+        for repeated in repeats.tolist():
+            self.received += 1
             if not repeated:
-                self.changed, self._same = number, 0
+                self.changed, self._same = self.received, 0
             self._same += 1
             longest = max(longest, self._same)
         self._last = rows[-1:]
-        self.received += len(rows)
-        self.sequence = int(numbers[-1])
         self.t_ns = 0 if block.t_ns is None else int(block.t_ns[-1])
         if block.device_ns is not None:
             self._delay_ns = self._delayed(self.t_ns, int(block.device_ns[-1]))
-        return lost, longest
+        return longest
 
     def _too_large(self, wrenches: FloatArray, limits: Limits, travelling: bool) -> Problem | None:
         largest = float(np.linalg.norm(wrenches[:, self._forces], axis=1).max())

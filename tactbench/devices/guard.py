@@ -27,14 +27,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
 
-from tactbench.core.errors import (
-    LinkClosed,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    RigError,
-    TactbenchError,
-)
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, RigError, TactbenchError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, fault_text
@@ -64,6 +57,8 @@ RETREAT_S = 1.0
 """Time added to the duration of a retreat, or of the force's mean after it, before it has failed [s] (assumed)."""
 REFUSED = 3
 """Number of refused commands in a row after which the guard retreats (assumed)."""
+MOVING, NO_SAMPLE = "an axis is moving", "no force sample has come since the last move"
+"""Reasons why a command comes too early; it may be sent again, and does not count as refused."""
 
 
 def largest_force_n(
@@ -125,7 +120,7 @@ class LocalGuard:
         self._force, self._clock, self._advance = force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
         self._watch = ForceWatch(self.force_stream)
-        self._limits: Limits | None = None
+        self._limits: Limits
         self.force_blocks, self.motor_blocks = self._watch.blocks, deque[Block](maxlen=MOST_BLOCKS)
         self.events: list[Event] = []
         self._kept = kept
@@ -201,7 +196,7 @@ class LocalGuard:
                 ) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._refused, self._touched = 0, False
-        self._end_sequence = self._watch.sequence
+        self._end_sequence = self._watch.received
         # The samples of a homing may be those of a minute: to send them would take the time of a beat.
         self.force_blocks.clear()
         self.motor_blocks.clear()
@@ -211,17 +206,16 @@ class LocalGuard:
 
     def beat(self, beat: Beat) -> Report:
         """Process a beat of the rig: note its time, and carry out its command; return at once."""
-        limits = self._limits
-        if self.state is GuardState.ARMED and limits is not None:
+        if self.state is GuardState.ARMED:
             self._counts["beats"] += 1
-            self._check_beat(beat.t_ns, limits)
+            self._check_beat(beat.t_ns)
             self._beat_ns = min(beat.t_ns, self._clock())
         self.look(0.0)
         # A problem that this look has found goes before the command.
-        if self.state is not GuardState.ARMED or limits is None:
+        if self.state is not GuardState.ARMED:
             return self._report(f"the guard is in state {self.state}")
-        reason, early = self._command(beat, limits)
-        if early:
+        reason = self._command(beat)
+        if reason in (MOVING, NO_SAMPLE):
             self._counts["early"] += 1
         elif reason:
             self._counts["refused"] += 1
@@ -231,7 +225,7 @@ class LocalGuard:
                 self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, reason of the last: {reason}")
         elif beat.command is not CommandKind.NONE:
             self._refused = 0
-        return self._report(reason, early=early)
+        return self._report(reason)
 
     def advance(self, until_ns: int) -> None:
         """Check all devices repeatedly until the clock has reached `until_ns`."""
@@ -247,7 +241,7 @@ class LocalGuard:
         force, order = Counter(self._force.counts), self._watch.order
         force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
         axes = {name: dict(axis.counts) for name, axis in self._axes.items()}
-        return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
+        return {FORCE: +force, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
         """Retreat, and expect no more beats; this also clears a fault.
@@ -260,7 +254,7 @@ class LocalGuard:
         if self.state is not GuardState.IDLE:
             self.state = GuardState.IDLE
             self._record(None, "disarmed")
-        self._limits, self.trigger = None, None
+        self.trigger = None
         return self._report()
 
     def close(self) -> None:
@@ -280,14 +274,13 @@ class LocalGuard:
     def look(self, timeout_s: float) -> None:
         """Read all devices, waiting at most `timeout_s` for a force sample, and react to problems."""
         began_ns = self._clock()  # where this look itself is held up, a beat may wait that was not received yet
-        watched = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
-        problem = self._read_devices(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
-        limits = self._limits
+        limits = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
+        problem = self._read_devices(timeout_s, limits, travelling=any(axis.moving for axis in self._others.values()))
         if limits is None:
             return
         if problem is not None:
             self.trip(*problem)
-        self._check_beat(began_ns, limits)
+        self._check_beat(began_ns)
         touched = self._into_skin and self._press.moving and self._watch.touched(limits.touch_n)
         if self.state is GuardState.ARMED and touched:
             self._into_skin, self._touched = False, True
@@ -307,10 +300,10 @@ class LocalGuard:
         here = [name for name, axis in self._axes.items() if axis.facts.homes_here and name in unhomed]
         return self._not_out or (f"{', '.join(here)} takes its present place as home" if here else "")
 
-    def _check_beat(self, now_ns: int, limits: Limits) -> None:
-        age_s = 1e-9 * (now_ns - self._beat_ns)
-        if age_s > limits.heartbeat_s:
-            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, limit {1e3 * limits.heartbeat_s:.1f} ms")
+    def _check_beat(self, now_ns: int) -> None:
+        age_s, most_s = 1e-9 * (now_ns - self._beat_ns), self._limits.heartbeat_s
+        if age_s > most_s:
+            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, limit {1e3 * most_s:.1f} ms")
 
     def _read_devices(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
         """Read all devices; return the first problem, those of the force before those of axes."""
@@ -348,7 +341,7 @@ class LocalGuard:
         if axis is self._press:
             self.motor_blocks += blocks
             if was_moving and not axis.moving:
-                self._end_sequence = self._watch.sequence
+                self._end_sequence = self._watch.received
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
             return Trigger.AXIS_FAULT, f"{name}: the controller reports {axis.state.problem}"
@@ -356,26 +349,26 @@ class LocalGuard:
 
     # Commands ---------------------------------------------------------------------------------------------------------
 
-    def _command(self, beat: Beat, limits: Limits) -> tuple[str, bool]:
-        """Carry out a beat's command; return the reason of a refusal (else empty), and True if it came too early."""
+    def _command(self, beat: Beat) -> str:
+        """Carry out a beat's command; return the reason of a refusal, else an empty text."""
         if beat.command is CommandKind.NONE:
-            return "", False
+            return ""
         if beat.command is CommandKind.RETREAT:
             self.trip(Trigger.COMMANDED, "commanded by the rig")
-            return "", False
+            return ""
         if beat.command is CommandKind.STOP:
             self._into_skin = False
             self._halt(*(axis for axis in self._axes.values() if axis.moving))
-            return "", False
-        if beat.force_sequence > self._watch.sequence:
-            return f"force sample {beat.force_sequence} has not been received", False
+            return ""
+        if beat.force_sequence > self._watch.received:
+            return f"force sample {beat.force_sequence} has not been received"
         travels, press = beat.command is CommandKind.TRAVEL, self._press
-        if reason := self._travel_reason(beat) if travels else self._press_reason(beat, limits):
-            return reason, False
+        if reason := self._travel_reason(beat) if travels else self._press_reason(beat):
+            return reason
         if any(axis.moving for axis in self._axes.values()):
-            return "an axis is moving", True
+            return MOVING
         if min(beat.force_sequence, self._watch.changed) <= self._end_sequence:
-            return "no force sample has come since the last move", True
+            return NO_SAMPLE
         self._into_skin = self._touched = False
         try:
             if travels:
@@ -387,8 +380,8 @@ class LocalGuard:
                 self._into_skin = press.state is not None and beat.position_m > press.state.target
                 press.move_to(beat.position_m, beat.speed_m_s)
         except Exception as error:  # of the axis' driver, whatever it is: the command was not carried out
-            return fault_text(error), False
-        return "", False
+            return fault_text(error)
+        return ""
 
     def _travel_reason(self, beat: Beat) -> str:
         if not self._retracted or self._press.moving:
@@ -399,9 +392,9 @@ class LocalGuard:
                 return f"the target of {name} is outside its travel"
         return ""
 
-    def _press_reason(self, beat: Beat, limits: Limits) -> str:
+    def _press_reason(self, beat: Beat) -> str:
         """Return the reason why the pressing axis may not move as commanded; empty if it may."""
-        state, force_n = self._press.state, self._watch.force_n
+        state, limits, force_n = self._press.state, self._limits, self._watch.force_n
         if state is None or math.isnan(state.target):
             return f"the target of {self._name} is not known"
         is_step, (low, high) = beat.command is CommandKind.STEP, limits.travel_m
@@ -459,7 +452,6 @@ class LocalGuard:
         The pressing axis is out if it is at rest at its place of retreat and the mean force since then is near zero.
         """
         press, now_ns, limits = self._press, self._clock(), self._limits
-        assert limits is not None
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         fresh = press.state is not None and press.state.t_ns > self._sent_ns
         # An axis that is lost while it moves ends its move unobserved.
@@ -627,19 +619,19 @@ class LocalGuard:
         self.events.append(event)
         self._on_event(event)
 
-    def _report(self, reason: str = "", *, early: bool = False) -> Report:
+    def _report(self, reason: str = "") -> Report:
         watch, state = self._watch, self._press.state
         return Report(
             t_ns=self._clock(),
             state=self.state,
             reason=reason,
-            early=early,
+            early=reason in (MOVING, NO_SAMPLE),
             moving=any(axis.moving for axis in self._axes.values()),
             position_m=self._press.position,
             target_m=math.nan if state is None else state.target,
             positions={name: axis.position for name, axis in self._axes.items()},
             force_n=watch.force_n,
-            force_sequence=watch.sequence,
+            force_sequence=watch.received,
             touched=self._touched,
             trigger=self.trigger,
             not_out=self._not_out,

@@ -126,7 +126,7 @@ class Limits:
     same_samples: int = 50
     """Number of equal samples in a row after which a force sensor counts as stuck (assumed)."""
     lost_samples: int = 3
-    """Largest permitted number of samples lost in a row (assumed)."""
+    """Largest permitted number of samples that are missing in one reading of the force sensor (assumed)."""
 
     def pressing_n(self, data: FloatArray) -> FloatArray:
         """Return the (n,) raw pressing forces [N], less the zero, of (n, channels) samples of the force stream."""
@@ -195,7 +195,7 @@ class Report:
     force_n: float = math.nan
     """Latest raw pressing force [N], less the zero."""
     force_sequence: int = -1
-    """Number of the latest force sample, counted by its device or by the guard."""
+    """Number of force samples that the guard has received."""
     touched: bool = False
     """True if the guard has ended the last MOVE_TO at a touch."""
     trigger: Trigger | None = None

@@ -325,7 +325,7 @@ class _Server:
         if guard is None:
             return result, [], [], [], {}
         waiting = guard.force_blocks, guard.motor_blocks, guard.events
-        answer = result, list(guard.force_blocks), list(guard.motor_blocks), list(guard.events), guard.counts
+        answer = result, *([*items] for items in waiting), guard.counts
         for items in waiting:
             items.clear()
         return answer

@@ -89,8 +89,6 @@ class PositionerState:
     position: float
     target: float = math.nan
     """Commanded position; NaN: not known."""
-    current_a: float = math.nan
-    """Motor current without sign [A]; NaN: not known."""
     problem: str = ""
     """Reported condition that must end a press, such as current limit or deviation; empty: no such condition."""
 
@@ -163,7 +161,7 @@ class Positioner(Driver):
 
     The call that detects a failure raises PositionerSilentError, another PositionerError, or a LinkError.
 
-    As a device of a rig an axis has one stream, `motor`: position, current and target, one row for each state read.
+    As a device of a rig an axis has one stream, `motor`: position and target, one row for each state read.
     A subclass defines abstract methods and class attributes. It calls :meth:`check_move` before it sends a move,
     :meth:`begin` after, and :meth:`see` with each answer. A DeviceDescriptor's `driver` names the class itself.
     """
@@ -310,16 +308,7 @@ class Positioner(Driver):
         self._moving, self._goal, self._nearest, self._retreats = True, target, math.inf, False
         self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
-    def see(
-        self,
-        t_ns: int,
-        position: float,
-        *,
-        idle: bool,
-        target: float | None = None,
-        current_a: float = math.nan,
-        problem: str = "",
-    ) -> None:
+    def see(self, t_ns: int, position: float, *, idle: bool, target: float | None = None, problem: str = "") -> None:
         """Register an answer: its time, the position, `idle` as the controller reports it, and other values.
 
         A move ends when the axis is idle at its target; an idle axis elsewhere has not begun to move. A halt ends when
@@ -329,7 +318,7 @@ class Positioner(Driver):
         last, halted, facts = self.position, math.isnan(self._goal), self.facts
         if target is None:
             target = position if halted else self._goal
-        self.note(PositionerState(t_ns, position, target, current_a, problem))
+        self.note(PositionerState(t_ns, position, target, problem))
         off = abs(position - (last if halted else self._goal))
         if idle and off <= (facts.resolution if halted else facts.near):
             self._moving, self._halts = False, 0
@@ -464,7 +453,6 @@ class Positioner(Driver):
         """The stream `motor`, at the rate that the serial line permits."""
         channels = (
             ChannelSpec(name="position", kind="position", unit="m"),
-            ChannelSpec(name="current", kind="other", unit="A"),
             ChannelSpec(name="target", kind="position", unit="m"),
         )
         return (StreamSpec(name=self.stream, channels=channels),)
@@ -483,7 +471,7 @@ class Positioner(Driver):
         states, self._unread = self._unread, []
         if not states:
             return []
-        data = np.array([(one.position, one.current_a, one.target) for one in states])
+        data = np.array([(one.position, one.target) for one in states])
         marks = ~np.isfinite(data) * np.uint8(Quality.MISSING)
         t_ns = np.array([one.t_ns for one in states], dtype=np.int64)
         return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]

@@ -202,7 +202,7 @@ class Press:
             return self._guarded(report, now_s)
         match self.state:
             case PressState.APPROACH:
-                self._approach(report, now_s)
+                return self._approach(report, now_s)
             case PressState.LIFT | PressState.RETURN | PressState.UNLOAD:
                 self._on_the_way(report, now_s)
             case PressState.UNLOADED:
@@ -250,10 +250,8 @@ class Press:
         self._requested_s = None
 
     def _pending(self, report: Report, now_s: float) -> Beat:
-        """Return the pending move until the guard accepts it; a stop is returned at once."""
-        if self._goal is None or self._requested_s is not None:
-            return Beat()
-        if report.moving and self._goal.command is not CommandKind.STOP:
+        """Return the pending move until the guard accepts it."""
+        if self._goal is None or self._requested_s is not None or report.moving:
             return Beat()
         self._requested_s = now_s
         return self._goal
@@ -267,12 +265,12 @@ class Press:
             return False
         return not report.moving
 
-    def _approach(self, report: Report, now_s: float) -> None:
+    def _approach(self, report: Report, now_s: float) -> Beat:
         plan, goal = self._plan, self._goal
-        if goal is None or goal.command is CommandKind.STOP:  # standing after a touch
-            if not report.moving and (goal is None or self._requested_s is not None):
+        if goal is None:  # after a touch
+            if not report.moving:
                 self._begin_loop(PressState.CONTACT, report, now_s)
-            return
+            return Beat()
         slowly, mean_n = goal.position_m == plan.found_m, self.mean_n
         begun = self._requested_s is not None
         touched = begun and (report.touched or mean_n > plan.mean_n)
@@ -284,14 +282,15 @@ class Press:
                 "something is in the way, the motor's position is wrong, or the zero was taken under load"
             )
         elif touched:
+            self._goal = None
             # The guard has halted the axis at single forces; at a mean it is halted from here.
-            self._goal = None if report.touched else Beat(command=CommandKind.STOP)
-            self._requested_s = None
+            return Beat(command=CommandKind.NONE if report.touched else CommandKind.STOP)
         elif self._arrived(report, now_s):
             if not slowly:
                 self._move(plan.found_m, plan.touch_speed_m_s)
             else:
                 self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, below the surface of the rig file")
+        return self._pending(report, now_s)
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
         """Enter the next state at the end of a move; when returning to the skin, also at a touch."""

@@ -16,12 +16,14 @@ from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.emulation.emulated_devices import EmulatedDevice
 from tactbench.devices.emulation.line import split_faults
-from tactbench.devices.emulation.scene_samples import PRESSING_FORCE
+from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.devices.emulator import EmulatorSettings, Senses
 from tactbench.links.address import open_link
 from tactbench.links.link import Clock, Link
+
+PRESSING_FORCE = "fz"
+"""Channel name of the force on the sensor in simulated rigs [N], positive when pressing."""
 
 
 def with_sensor(file: RigFile, sensor: str) -> RigFile:
@@ -95,10 +97,8 @@ def emulated_device(
 
     of_link, of_device = split_faults(entry.faults)
     rng = np.random.default_rng([seed, *name.encode()])
-    options = options_of(descriptor, entry)
-    emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, options, of_device))
-    baud = options.get("baud")
-    return EmulatedDevice(descriptor.emulated_link, emulator, of_link, baud if isinstance(baud, int) else None)
+    settings = EmulatorSettings(own, rng, options_of(descriptor, entry), of_device)
+    return EmulatedDevice(descriptor.emulated_link, load_object(descriptor.emulator)(settings), of_link)
 
 
 def drivers_of(

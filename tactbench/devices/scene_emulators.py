@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any, Protocol
@@ -18,12 +19,14 @@ from tactbench.core.errors import NotApplicable, RigError, TactbenchError, Usage
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.rigs import rig_context
+from tactbench.core.samples import Block, join_blocks
 from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, RigFile
 from tactbench.core.spec.scene import Scene
-from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
-from tactbench.devices.emulation.scene_samples import SceneSamples
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.emulation.real_time import RealTimeDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.devices.rig_devices import descriptor_of, emulators_of, options_of
 
 PREPARE_S = 300.0
@@ -32,6 +35,56 @@ BEGIN_S = 5.0
 """Timeout for the begin of a scene in another process [s]."""
 LISTEN_S = 0.2
 """Longest wait for a message [s], after which the devices are checked for errors."""
+
+
+class SceneSamples:
+    """A scene as :data:`~tactbench.devices.emulator.Senses`: each channel's latest sample up to a given time.
+
+    Each channel holds its value until its next sample, so that the samples of sensor and force sensor stay as
+    simultaneous as they were simulated. Before and after the scene nothing is pressed: the samples of its first
+    `rest_s` seconds, before pressing began, repeat, offsets and noise included. :meth:`start` begins the scene.
+
+    Parameters
+    ----------
+    streams
+        Streams of the sensor and the force sensor.
+    blocks
+        Their blocks, with times in nanoseconds since the begin of the scene.
+    duration_s
+        Length of the scene [s].
+    rest_s
+        Length of the scene's unloaded beginning [s]; 0: only the first sample is held.
+    """
+
+    def __init__(
+        self, streams: Sequence[StreamSpec], blocks: Iterable[Block], duration_s: float, *, rest_s: float = 0.0
+    ) -> None:
+        self._end_ns, self._rest_ns = round(1e9 * duration_s), round(1e9 * min(rest_s, duration_s))
+        self._start_s: float | None = None
+        came, self._tracks = list(blocks), []
+        for stream in streams:
+            own = [block for block in came if block.stream == stream.name]
+            if own and (whole := join_blocks(own)).t_ns is not None:
+                names = tuple(channel.name for channel in stream.channels)
+                self._tracks.append((whole.t_ns.tolist(), names, whole.data.tolist()))
+        self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
+
+    def start(self, at_s: float) -> None:
+        """Let the scene begin at `at_s` on the devices' clock; a scene may be begun several times."""
+        self._start_s = at_s
+
+    def __call__(self, t_s: float) -> Mapping[str, float]:
+        """Return the value of every channel, in its unit, at the time `t_s` of the devices' clock [s]."""
+        since_ns = round(1e9 * (t_s - (self._start_s or 0.0)))
+        if self._start_s is None or not 0 <= since_ns < self._end_ns:
+            since_ns = since_ns % self._rest_ns if self._rest_ns else 0
+        rows = tuple(max(bisect_right(times, since_ns) - 1, 0) for times, _, _ in self._tracks)
+        if rows != self._last[0]:
+            found: dict[str, float] = {}
+            for row, (_, names, samples) in zip(rows, self._tracks, strict=True):
+                found.update(zip(names, samples[row], strict=True))
+            self._last = rows, found
+        return self._last[1]
 
 
 class RigEmulators(Protocol):
@@ -92,15 +145,12 @@ def serve(
     physics = physics_of(file, registry)
     where = registry.rigs[file.rig].emulators
     emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control,
-        EmulatedDevices(emulators.devices, time="real") as emulated,
-    ):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control, RealTimeDevices(emulators.devices) as emulated:
         control.bind(("127.0.0.1", 0))
         control.settimeout(LISTEN_S)
         started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
         while True:
-            emulated.advance(emulated.clock())  # raises the error of an emulator
+            emulated.check()
             try:
                 data, peer = control.recvfrom(65536)
             except TimeoutError:
@@ -110,7 +160,7 @@ def serve(
                 if request.get("begin"):
                     emulators.begin(emulated.clock() * 1e-9)
                     progress("The scene begins")
-                elif physics is not None:
+                else:
                     sensor, scene = registry.sensors[request["sensor"]], Scene.model_validate(request["scene"])
                     with physics.open(sensor, scene, seed=request["seed"]) as simulated:
                         emulators.prepare(simulated, sensor, scene, request["seed"])
@@ -142,9 +192,10 @@ class ScenePhysics(Rig):
     Parameters
     ----------
     rig
-        The simulated rig; None: it runs in the process of the emulated devices.
+        The simulated rig; None: it runs in the process of the emulated devices, or there are none.
     control
-        Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file.
+        Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file; empty: no such
+        process, and without a rig nothing is simulated.
     """
 
     def __init__(self, rig: Rig | None, control: str = "") -> None:
@@ -163,6 +214,10 @@ class ScenePhysics(Rig):
             with self._rig.open(sensor, scene, seed=seed) as simulated:
                 yield simulated
             return
+        if not self._control:
+            nothing: Any = SimpleNamespace(plan=(), assumptions={}, drawn={})
+            yield nothing
+            return
         request = {"sensor": sensor.name, "scene": scene.model_dump(mode="json"), "seed": seed}
         answer = self._request(request, PREPARE_S)
         plan = tuple(map(PlanEntry.model_validate, answer.pop("plan")))
@@ -171,7 +226,7 @@ class ScenePhysics(Rig):
 
     def begin(self) -> None:
         """Let the scene begin in the other process; raises the errors of :meth:`open`."""
-        if self._rig is None:
+        if self._control:
             self._request({"begin": True}, BEGIN_S)
 
     def _request(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
@@ -192,8 +247,8 @@ class ScenePhysics(Rig):
         return answer
 
 
-def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
-    """Return the simulation of scenes for a rig's emulated devices; None: the rig file has no emulated devices.
+def physics_of(file: RigFile, registry: Registry) -> ScenePhysics:
+    """Return the simulation of scenes for a rig's emulated devices, if it has any.
 
     Raises
     ------
@@ -201,7 +256,7 @@ def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
         If the rig under `physics` is not a simulation.
     """
     if not file.emulated:
-        return ScenePhysics(None, file.emulation.control) if file.emulation.control else None
+        return ScenePhysics(None, file.emulation.control)
     descriptor = registry.rigs[file.emulation.physics or registry.first_rig("simulated")]
     if not descriptor.simulated:
         raise UsageError(

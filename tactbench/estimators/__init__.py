@@ -66,7 +66,14 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
             "extra-trees", "Extremely randomised trees", BOTH, "nonlinear:extra_trees", linear=False,
             params={"n_estimators": 200, "min_samples_leaf": 2}, rehearsal={"n_estimators": 2},
         ),
-        *(forest for trees in TREES for forest in _forests(trees)),
+        *(
+            _estimator(
+                "forest" if trees == TREES[0] else f"forest-{trees}", f"Random forest of {trees} trees", BOTH,
+                "nonlinear:forest", linear=False, rehearsal={"n_estimators": 2},
+                params={"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1},
+            )
+            for trees in TREES
+        ),
         *_slip_detectors(),
     ]  # fmt: skip
 
@@ -75,21 +82,6 @@ def _estimator(name: str, title: str, kinds: tuple[str, ...], where: str, **more
     """Return an estimator's descriptor; by default a rehearsal runs the estimator with its usual parameters."""
     fields = {"name": name, "title": title, "kinds": kinds, "where": f"tactbench.estimators.{where}", "rehearsal": {}}
     return EstimatorDescriptor.model_validate(fields | more)
-
-
-def _forests(trees: int) -> list[EstimatorDescriptor]:
-    number = "" if trees == TREES[0] else f"-{trees}"
-    more = {"linear": False, "params": {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}}
-    return [
-        _estimator(
-            f"forest{number}", f"Random forest of {trees} trees", BOTH, "nonlinear:forest",
-            rehearsal={"n_estimators": 2}, **more,
-        ),
-        _estimator(
-            f"forest-fast{number}", f"Random forest of {trees} trees by oneDAL (extra: fast)", BOTH,
-            "nonlinear:fast_forest", distributions=("scikit-learn-intelex", "daal"), rehearsal=None, **more,
-        ),
-    ]  # fmt: skip
 
 
 def _slip_detectors() -> list[EstimatorDescriptor]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import Estimator, FloatArray, NotApplicable
+from tactbench.plugin import Estimator, FloatArray
 
 
 class Wrapped:
@@ -65,58 +64,6 @@ def extra_trees(*, kind: str, seed: int, threads: int, **params: Any) -> Estimat
     return Forest(make(random_state=seed, **params), threads)
 
 
-class FastForest(Wrapped):
-    """A forest that raises an error when scikit-learn-intelex falls back to plain scikit-learn.
-
-    The library falls back silently for parameters that oneDAL does not support (more than 6024 trees, some criteria
-    and weights). The benchmark would then state the plain forest's results under the wrong name.
-    """
-
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> FastForest:
-        """Grow the trees on X (n, p) and y (n,).
-
-        Raises
-        ------
-        NotApplicable
-            If oneDAL did not grow the trees.
-        """
-        # daal4py compares versions with distutils: nothing a user could do, and nothing about the data.
-        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-            self.model.fit(X, y)
-        if not hasattr(self.model, "_onedal_estimator"):
-            raise NotApplicable(
-                f"scikit-learn-intelex does not accelerate a forest with these parameters "
-                f"(n_estimators={self.model.n_estimators}): it fell back to plain scikit-learn.",
-                hint="Use the estimator `forest`.",
-            )
-        return self
-
-    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Return the (n,) predictions for the features X (n, p)."""
-        return super().predict(X).reshape(len(X))
-
-
-def fast_forest(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
-    """Return a random forest computed by oneDAL through scikit-learn-intelex.
-
-    oneDAL sorts features into 256 bins and draws other random numbers, so that its trees differ from scikit-learn's.
-
-    Raises
-    ------
-    NotApplicable
-        If scikit-learn-intelex is not installed.
-    """
-    try:
-        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-            from sklearnex.ensemble import RandomForestClassifier, RandomForestRegressor
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != "sklearnex":
-            raise  # it is there, and broken
-        raise NotApplicable("needs scikit-learn-intelex: pip install 'tactbench[fast]' (x86-64 only)") from error
-    make = RandomForestClassifier if kind == "classification" else RandomForestRegressor
-    return FastForest(make(random_state=seed, n_jobs=threads, **params))
-
-
 def boosting(*, kind: str, seed: int, threads: int, **params: Any) -> Any:
     """Return scikit-learn's gradient boosting (Friedman 2001) of trees on histograms (Ke et al. 2017).
 
@@ -139,7 +86,7 @@ class Neighbours(Wrapped):
         return self
 
 
-def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estimator:
+def neighbours(*, kind: str, seed: int, threads: int, **params: Any) -> Estimator:
     """Return an estimator that predicts the vote, or the mean, of the `n_neighbors` nearest rows with equal weights.
 
     Fifteen neighbours (assumed): neighbours in feature space are mostly consecutive samples; at 100 Hz five of them
@@ -148,7 +95,7 @@ def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estim
     from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 
     make = KNeighborsClassifier if kind == "classification" else KNeighborsRegressor
-    return Neighbours(make(n_neighbors=n_neighbors, n_jobs=threads))
+    return Neighbours(make(n_jobs=threads, **params))
 
 
 class OfUnitSpread(Wrapped):
@@ -191,7 +138,7 @@ class EveryNth(Wrapped):
         return self
 
 
-def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Estimator:
+def support_vectors(*, kind: str, seed: int, threads: int, rows: int, **params: Any) -> Estimator:
     """Return libsvm's support vector machine (Cortes and Vapnik 1995) with a Gaussian kernel.
 
     Classes are compared in pairs; for numbers, the tube is 0.1 standard deviations of y wide. ``gamma="scale"`` is
@@ -199,11 +146,11 @@ def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: floa
     """
     from sklearn.svm import SVC, SVR
 
-    model = SVC(C=C, gamma=gamma) if kind == "classification" else OfUnitSpread(SVR(C=C, gamma=gamma, epsilon=0.1))
+    model = SVC(**params) if kind == "classification" else OfUnitSpread(SVR(epsilon=0.1, **params))
     return EveryNth(model, rows)
 
 
-def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Estimator:
+def perceptron(*, kind: str, seed: int, threads: int, hidden: int, **params: Any) -> Estimator:
     """Return a neural network with one hidden layer of `hidden` rectified units, trained by Adam (Kingma and Ba 2015).
 
     Training ends after ten epochs without a better score on a tenth of the training rows, drawn by the seed, or after
@@ -212,8 +159,5 @@ def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float,
     """
     from sklearn.neural_network import MLPClassifier, MLPRegressor
 
-    settings = {
-        "hidden_layer_sizes": (hidden,), "alpha": alpha, "max_iter": max_iter, "early_stopping": True,
-        "random_state": seed,
-    }  # fmt: skip
+    settings = {"hidden_layer_sizes": (hidden,), "early_stopping": True, "random_state": seed, **params}
     return MLPClassifier(**settings) if kind == "classification" else OfUnitSpread(MLPRegressor(**settings))

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.estimators.nonlinear import EveryNth
-from tactbench.plugin import NotApplicable, StreamReadings
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.plugin import FloatArray
+from tactbench.plugin import FloatArray, NotApplicable, StreamReadings
 
 LEVELS = 5
 """Largest number of levels of the wavelet transform: five levels reach down to 34 Hz at a rate of 2.2 kHz."""
@@ -62,30 +58,25 @@ class ClassifierDetector(EveryNth):
         return np.asarray(self.model.predict_proba(X)[:, 1])
 
 
-def forest(
-    *, kind: str, seed: int, threads: int, n_estimators: int, min_samples_leaf: int, rows: int
-) -> ClassifierDetector:
+def forest(*, kind: str, seed: int, threads: int, rows: int, **params: Any) -> ClassifierDetector:
     """Return a random forest with equal weights of both classes, slip and no slip."""
     from sklearn.ensemble import RandomForestClassifier
 
-    model = RandomForestClassifier(
-        n_estimators=n_estimators, min_samples_leaf=min_samples_leaf, class_weight="balanced", random_state=seed
-    )
-    return ClassifierDetector(model, rows)
+    return ClassifierDetector(RandomForestClassifier(class_weight="balanced", random_state=seed, **params), rows)
 
 
-def support_vectors(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
+def support_vectors(*, kind: str, seed: int, threads: int, rows: int, **params: Any) -> ClassifierDetector:
     """Return a support vector machine with a Gaussian kernel and equal weights of both classes, slip and no slip."""
     from sklearn.svm import SVC
 
-    return ClassifierDetector(SVC(C=C, class_weight="balanced"), rows)
+    return ClassifierDetector(SVC(class_weight="balanced", **params), rows)
 
 
-def logistic(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
+def logistic(*, kind: str, seed: int, threads: int, rows: int, **params: Any) -> ClassifierDetector:
     """Return a logistic regression with equal weights of both classes, slip and no slip."""
     from sklearn.linear_model import LogisticRegression
 
-    return ClassifierDetector(LogisticRegression(C=C, class_weight="balanced", max_iter=1000), rows)
+    return ClassifierDetector(LogisticRegression(class_weight="balanced", max_iter=1000, **params), rows)
 
 
 def wavelet_amplitudes(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> FloatArray:

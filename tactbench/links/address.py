@@ -23,28 +23,24 @@ class _Line(BaseModel):
     stop_bits: int = Field(default=1, ge=1, le=2)
 
 
-class _Spi(BaseModel):
+class _Bridge(BaseModel):
     speed_hz: PositiveInt
     mode: int = Field(default=0, ge=0, le=3)
-
-
-class _Bridge(_Spi):
-    baud: PositiveInt = 1
+    baud: PositiveInt = 115200
 
 
 class _Kind(NamedTuple):
     example: str
-    options: type[BaseModel]
+    options: type[BaseModel] = _None
 
 
 KINDS = {
     "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _Line),
     "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _Line),
-    "socket": _Kind("socket://192.168.1.5:4001", _None),
-    "loop": _Kind("loop://", _None),
-    "can": _Kind("can://socketcan/can0", _None),
-    "udp": _Kind("udp://192.168.1.1:49152", _None),
-    "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
+    "socket": _Kind("socket://192.168.1.5:4001"),
+    "loop": _Kind("loop://"),
+    "can": _Kind("can://socketcan/can0"),
+    "udp": _Kind("udp://192.168.1.1:49152"),
     "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
 }
 """Kind of link -> example and keys of its address; the keys of ``can`` are python-can's."""
@@ -93,7 +89,7 @@ def parse_address(text: str) -> tuple[str, str, dict[str, Any]]:
     UnknownNameError
         If the scheme, the kind of bus or a key is unknown; the message names similar known ones.
     UsageError
-        If a part is missing, given twice or invalid; the hint has an example.
+        If a value is missing or invalid; the hint has an example.
     """
     kind, separator, rest = text.partition("://")
     if not separator:
@@ -105,16 +101,14 @@ def parse_address(text: str) -> tuple[str, str, dict[str, Any]]:
         kind = f"spi/{bus}"
     if kind not in KINDS:
         raise UnknownNameError("kind of link", kind, KINDS)
+    given = dict(parse_qsl(query, keep_blank_values=True))
     if kind == "can":
-        import can
+        from can.util import cast_from_string
 
-        if (interface := target.partition("/")[0]) not in can.VALID_INTERFACES:
-            raise UnknownNameError("kind of can:// link", interface, sorted(can.VALID_INTERFACES))
-    if kind != "loop" and not (target.partition("/")[2] if kind == "can" else target):
-        raise _wrong(text, kind, "lacks a target after ://")
-    if kind in ("udp", "socket") and not all(_host_and_port(target)):
-        raise _wrong(text, kind, "does not end in a host and a port, 1 to 65535")
-    return kind, target, _options(text, kind, query)
+        return kind, target, {key: cast_from_string(value) for key, value in given.items()}
+    example, model = KINDS[kind]
+    options = read_options(model, given, f"the address {text!r}", hint=f"Write it like {example}.")
+    return kind, target, options.model_dump()
 
 
 def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
@@ -138,46 +132,24 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     from tactbench.links.can_link import CanBus
     from tactbench.links.datagram_link import UdpLink
     from tactbench.links.spi_bridge import SpiBridge
-    from tactbench.links.spi_link import SpidevLink
 
     kind, target, options = parse_address(address)
     match kind:
         case "udp":
-            return UdpLink(*_host_and_port(target), clock=clock)
+            try:
+                parts = urlsplit(f"//{target}")
+                host, port = parts.hostname, parts.port
+            except ValueError:
+                host = port = None
+            if not host or not port:
+                raise _wrong(address, kind, "does not end in a host and a port, 1 to 65535")
+            return UdpLink(host, port, clock=clock)
         case "can":
             interface, _, channel = target.partition("/")
             return CanBus(interface, channel, clock=clock, **options)
         case "spi/bridge":
-            return SpiBridge(SerialLink(target, baud=options.pop("baud", 115200), clock=clock), **options)
-        case "spi/spidev":
-            return SpidevLink(target, clock=clock, **options)
+            return SpiBridge(SerialLink(target, baud=options.pop("baud"), clock=clock), **options)
     return SerialLink(target if kind == "serial" else f"{kind}://{target}", clock=clock, **options)
-
-
-def _host_and_port(target: str) -> tuple[str, int]:
-    """Return the host and the port in `target`; an empty text and 0 if they are missing."""
-    try:
-        parts = urlsplit(f"//{target}")
-        return parts.hostname or "", parts.port or 0
-    except ValueError:
-        return "", 0
-
-
-def _options(text: str, kind: str, query: str) -> dict[str, object]:
-    import yaml
-
-    try:
-        pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
-    except ValueError:
-        raise _wrong(text, kind, f"has {query!r} where key=value was expected") from None
-    given: dict[str, Any] = dict(pairs)
-    if len(given) < len(pairs):
-        raise _wrong(text, kind, "gives a key twice")
-    if kind == "can":
-        return {key: yaml.safe_load(value) for key, value in pairs}
-    example, model = KINDS[kind]
-    read = read_options(model, given, f"the address {text!r}", hint=f"Write it like {example}.")
-    return read.model_dump(exclude_unset=True)
 
 
 def _wrong(text: str, kind: str, problem: str) -> UsageError:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
@@ -31,9 +31,6 @@ class BridgeEmulator:
     """Bit mask of the bridge's select lines."""
     fastest_hz: int = 10_000_000
     """Highest SPI clock [Hz]."""
-    faults: set[str] = field(default_factory=set)
-    """Present faults: ``dropped`` (batches run, their replies are not sent), ``doubled`` (replies are sent twice),
-    ``damaged`` (one bit of each reply is inverted)."""
 
     def __post_init__(self) -> None:
         self._speed_hz = 0
@@ -44,72 +41,63 @@ class BridgeEmulator:
     def feed(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
         """Take bytes from the host and return the replies sent until `now_s`, each with its time of sending [s]."""
         out = self.poll(now_s)
-        out += [(now_s, answer) for frame in self._decoder.feed(data) if (answer := self._answered(frame, now_s))]
+        for frame in self._decoder.feed(data):
+            kind = frame.kind | 0x80
+            try:
+                payload = self._executed(frame, now_s)
+            except (ValueError, struct.error) as refusal:
+                kind, payload = Kind.ERROR.reply, str(refusal).encode()
+            if payload is not None:
+                out.append((now_s, encode_frame(Frame(kind, frame.number, payload))))
         return out + self.poll(now_s)
 
     def poll(self, now_s: float) -> list[tuple[float, bytes]]:
         """Return the replies to batches finished by `now_s`, each with the time at which its batch finished [s]."""
         out = []
-        while self._due and self._due[0][0] <= now_s:
-            t_s, reply = self._due.popleft()
-            if reply:
-                out.append((t_s, reply))
+        while self.next_s() <= now_s:
+            out.append(self._due.popleft())
         return out
 
     def next_s(self) -> float:
         """Return the time of the next reply to a batch [s]; infinite: no batch is running."""
         return self._due[0][0] if self._due else math.inf
 
-    def _answered(self, frame: Frame, now_s: float) -> bytes:
-        try:
-            return self._executed(frame, now_s)
-        except (ValueError, struct.error):
-            return encode_frame(Frame(Kind.ERROR.reply, frame.number, b"malformed or not possible"))
-
-    def _executed(self, frame: Frame, now_s: float) -> bytes:
-        """Return the reply to a request, empty if sent later; raises ValueError or struct.error for a refusal."""
+    def _executed(self, frame: Frame, now_s: float) -> bytes | None:
+        """Return the reply's payload, None if the reply is sent later; raises ValueError or struct.error to refuse."""
         if frame.version != VERSION or len(frame.payload) > self.largest_payload:
-            raise ValueError
+            raise ValueError("version is unknown, or payload is too large")
         match Kind(frame.kind):
             case Kind.HELLO:
-                about = HELLO.pack(VERSION, self.largest_payload, self.holds, self.select_lines) + b"tactbench emulator"
-                return encode_frame(Frame(Kind.HELLO.reply, frame.number, about))
+                return HELLO.pack(VERSION, self.largest_payload, self.holds, self.select_lines) + b"tactbench emulator"
             case Kind.SETUP:
                 speed_hz, mode = SETUP.unpack(frame.payload)
                 if mode > 3 or not speed_hz:
-                    raise ValueError
+                    raise ValueError("clock or mode is not possible")
                 self._speed_hz = min(speed_hz, self.fastest_hz)
-                return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+                return SETUP.pack(self._speed_hz, mode)
             case Kind.BATCH:
-                return self._batch(frame, now_s)
-        raise ValueError
+                self._run(frame, now_s)
+                return None
+        raise ValueError("kind is unknown")
 
-    def _batch(self, frame: Frame, now_s: float) -> bytes:
+    def _run(self, frame: Frame, now_s: float) -> None:
+        """Run a batch after those before it."""
         if len(self._due) >= self.holds:
-            return encode_frame(Frame(Kind.ERROR.reply, frame.number, FULL))
-        steps = list(_steps(frame.payload))
-        if not (self._speed_hz and steps) or any(select & ~self.select_lines for select, _, _ in steps):
-            raise ValueError
-        begin_s = t_s = max(now_s, self._free_s)
-        payload = BEGIN.pack(int(begin_s * 1e6) & 0xFFFFFFFF)
+            raise ValueError(FULL.decode())
+        steps, rest = [], frame.payload
+        while rest:
+            select, pause_us, length = STEP.unpack_from(rest)
+            data, rest = rest[STEP.size : STEP.size + length], rest[STEP.size + length :]
+            if len(data) < length or select & ~self.select_lines:
+                raise ValueError("malformed payload")
+            steps.append((select, pause_us, data))
+        if not (self._speed_hz and steps):
+            raise ValueError("not set up, or malformed payload")
+        t_s = max(now_s, self._free_s)
+        payload = BEGIN.pack(int(t_s * 1e6) & 0xFFFFFFFF)
         for select, pause_us, data in steps:
             if data:
                 payload += self.exchange(select, data, t_s)
             t_s += 8 * len(data) / self._speed_hz + pause_us * 1e-6
         self._free_s = t_s
-        reply = encode_frame(Frame(Kind.BATCH.reply, frame.number, payload))
-        if "damaged" in self.faults:
-            reply = bytes([reply[0], reply[1] ^ 0x80]) + reply[2:]
-        times = 0 if "dropped" in self.faults else 2 if "doubled" in self.faults else 1
-        self._due.append((t_s, times * reply))
-        return b""
-
-
-def _steps(payload: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield select mask, pause [us] and bytes of each step; raises ValueError or struct.error for a short step."""
-    while payload:
-        select, pause_us, length = STEP.unpack_from(payload)
-        data, payload = payload[STEP.size : STEP.size + length], payload[STEP.size + length :]
-        if len(data) < length:
-            raise ValueError
-        yield select, pause_us, data
+        self._due.append((t_s, encode_frame(Frame(Kind.BATCH.reply, frame.number, payload))))

@@ -174,6 +174,8 @@ class CanBus(CanLink):
             options.setdefault("fd", False)
         if interface == "socketcan":
             options.pop("bitrate", None)  # a statement: `ip link set` sets it
+        if interface not in can.interfaces.BACKENDS:
+            raise UnknownNameError("kind of can:// link", interface, sorted(can.interfaces.BACKENDS))
         try:
             module, name = can.interfaces.BACKENDS[interface]
             known = inspect.signature(getattr(importlib.import_module(module), name).__init__).parameters
@@ -253,7 +255,6 @@ class CanBus(CanLink):
             raise self._unplugged(error) from error
 
     def _release(self) -> None:
-
         try:
             self._bus.shutdown()
         except _raised():

@@ -11,8 +11,10 @@ import struct
 import zlib
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 from tactbench.core.errors import LinkError, LinkTimeout
 from tactbench.links.byte_link import ByteLink
@@ -59,25 +61,16 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 class FrameDecoder:
-    """Decoder of frames from pieces of received bytes.
-
-    Attributes
-    ----------
-    damaged
-        Number of stretches between two zero bytes that were not valid frames.
-    """
+    """Decoder of frames from pieces of received bytes."""
 
     def __init__(self) -> None:
-        self.damaged = 0
         self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes; count stretches that are not valid frames in `damaged`."""
+        """Return the frames that `data` completes; what is no valid frame between two zero bytes is dropped."""
         *ended, rest = (self._pending + data).split(b"\0")
         self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
-        found = [_frame_in(stuffed) for stuffed in ended if stuffed]
-        self.damaged += found.count(None)
-        return [frame for frame in found if frame is not None]
+        return [frame for stuffed in ended if (frame := _frame_in(stuffed)) is not None]
 
 
 def _frame_in(stuffed: bytes) -> Frame | None:
@@ -128,7 +121,7 @@ FULL = b"full"
 """Text of the error reply to a batch for which the bridge has no room."""
 
 _ASK_S = 0.2
-"""Time between HELLO requests until the bridge answers [s] (assumed)."""
+"""Time between requests other than batches until the bridge answers [s] (assumed)."""
 
 
 class SpiBridge(SpiLink):
@@ -170,11 +163,12 @@ class SpiBridge(SpiLink):
         self._waiting: dict[int, tuple[int, ...]] = {}
         self._bytes = port
         try:
-            self._greet(wake_s)
-            reply = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
-            if len(reply.payload) != SETUP.size:
-                raise self._nonsense(reply)
-            self.speed_hz, _ = SETUP.unpack(reply.payload)
+            hello = self._answer(Kind.HELLO, b"", wake_s)
+            layout = f"{HELLO.format}{len(hello.payload) - HELLO.size}s"
+            self.firmware, self._largest, self.holds, self.select_lines, name = self._unpacked(layout, hello)
+            self.name = name.decode("ascii", "replace")
+            setup = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
+            self.speed_hz, _ = self._unpacked(SETUP.format, setup)
         except BaseException:
             self._bytes.close()
             raise
@@ -183,38 +177,28 @@ class SpiBridge(SpiLink):
         """Return the time by which the port's timeouts are measured [s]."""
         return self._bytes.timer()
 
-    def _greet(self, wake_s: float) -> None:
-        deadline = self.timer() + wake_s
-        while True:
-            try:
-                hello = self._answer(Kind.HELLO, b"", min(_ASK_S, wake_s))
-                break
-            except LinkTimeout as error:
-                if self.timer() >= deadline:
-                    raise LinkError(
-                        f"{self.address}: no SPI bridge answered within {wake_s:g} s.",
-                        hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
-                    ) from error
-        if len(hello.payload) < HELLO.size:
-            raise self._nonsense(hello)
-        self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
-        self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
-
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
-        """Send a request other than a batch, and return the reply; other frames are dropped."""
-        self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
-        deadline = self.timer() + timeout_s
-        while True:
-            frame, _ = self._next(timeout_s, deadline)
-            if frame.version != VERSION:
-                raise LinkError(
-                    f"{self.address}: the bridge uses version {frame.version} of the format, expected is {VERSION}.",
-                    hint="Update the bridge's firmware, or tactbench.",
-                )
-            if frame.kind == Kind.ERROR.reply:
-                raise self._refused(frame)
-            if frame.kind == kind.reply:
-                return frame
+        """Send a request other than a batch, again until it is answered; return the reply, and drop other frames."""
+        end_s = self.timer() + timeout_s
+        while (now_s := self.timer()) < end_s:
+            self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
+            with suppress(LinkTimeout):
+                while True:
+                    frame, _ = self._next(_ASK_S, min(now_s + _ASK_S, end_s))
+                    if frame.version != VERSION:
+                        raise LinkError(
+                            f"{self.address}: the bridge uses version {frame.version} of the format, expected is "
+                            f"{VERSION}.",
+                            hint="Update the bridge's firmware, or tactbench.",
+                        )
+                    if frame.kind == Kind.ERROR.reply:
+                        raise self._refused(frame)
+                    if frame.kind == kind.reply:
+                        return frame
+        raise LinkError(
+            f"{self.address}: no SPI bridge answered within {timeout_s:g} s.",
+            hint="Check that the port is the bridge's, and its firmware that of docs/links.md.",
+        )
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
         """Return the next frame, and the time of receipt of its last byte [ns]."""
@@ -254,9 +238,7 @@ class SpiBridge(SpiLink):
                 lengths = self._waiting.pop(number)
                 if number == frame.number:
                     break
-            if len(frame.payload) != BEGIN.size + sum(lengths):
-                raise self._nonsense(frame)
-            begun_us, *data = struct.unpack("<I" + "".join(f"{length}s" for length in lengths), frame.payload)
+            begun_us, *data = self._unpacked(BEGIN.format + "".join(f"{length}s" for length in lengths), frame)
             return SpiReply(frame.number, tuple(data), t_ns, begun_us)
 
     def abandon(self) -> None:  # noqa: D102
@@ -269,11 +251,15 @@ class SpiBridge(SpiLink):
             hint="See the errors of the bridge in docs/links.md.",
         )
 
-    def _nonsense(self, frame: Frame) -> LinkError:
-        return LinkError(
-            f"{self.address}: the bridge's reply to request {frame.number} has a wrong length: {len(frame.payload)}.",
-            hint="Check that the bridge runs the firmware of docs/links.md.",
-        )
+    def _unpacked(self, layout: str, frame: Frame) -> tuple[Any, ...]:
+        try:
+            return struct.unpack(layout, frame.payload)
+        except struct.error as error:
+            raise LinkError(
+                f"{self.address}: the bridge's reply to request {frame.number} has a wrong length: "
+                f"{len(frame.payload)}.",
+                hint="Check that the bridge runs the firmware of docs/links.md.",
+            ) from error
 
     def _release(self) -> None:
         self._bytes.close()

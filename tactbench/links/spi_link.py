@@ -1,14 +1,12 @@
-"""SPI links: batches of transfers to devices behind an adapter, or on a Linux machine's own bus."""
+"""SPI links: batches of transfers to devices behind an adapter."""
 
 from __future__ import annotations
 
-import time
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tactbench.links.link import Clock, Link, cannot_open
+from tactbench.links.link import Link
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,72 +74,3 @@ class SpiLink(Link):
         self._usable()
         self._number = (self._number + 1) & 0xFFFF
         return self._number
-
-
-class SpidevLink(SpiLink):
-    """SPI bus of a Linux machine, through ``/dev/spidevBUS.SELECT``.
-
-    This process executes a batch when it is sent: pauses are at least as long as requested, and longer when the system
-    has other work. Not yet tested with a real device.
-
-    Parameters
-    ----------
-    device
-        Bus and select line, like ``0.0``. Linux activates one line at a time: `select` of a step is 1.
-    speed_hz
-        Clock of the SPI bus [Hz].
-    mode
-        SPI mode, 0 to 3.
-    clock
-        Function that returns the times of receipt [ns].
-
-    Raises
-    ------
-    LinkError
-        If spidev is not installed, or the device cannot be opened.
-    """
-
-    def __init__(self, device: str, *, speed_hz: int, mode: int = 0, clock: Clock = time.monotonic_ns) -> None:
-        super().__init__(f"spi://spidev/{device}", clock)
-        self.speed_hz = speed_hz
-        self.holds = 1
-        self._replies: deque[SpiReply] = deque()
-        try:
-            import spidev
-
-            self._device = spidev.SpiDev()
-            self._device.open(*map(int, device.split(".")))
-            self._device.max_speed_hz = speed_hz
-            self._device.mode = mode
-        except OSError as error:
-            raise cannot_open(self.address, error) from error
-        except (ImportError, ValueError, TypeError) as error:
-            hint = "Write spi://spidev/BUS.LINE, and run pip install 'tactbench[spi]' (Linux only)."
-            raise cannot_open(self.address, error, hint=hint) from error
-
-    def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)
-        number = self._next_number()
-        data = []
-        try:
-            for step in steps:
-                data.append(bytes(self._device.xfer2(list(step.data))) if step.data else b"")
-                released = time.perf_counter_ns()
-                # Pauses of tens of microseconds are shorter than any sleep.
-                while time.perf_counter_ns() - released < 1000 * step.pause_us:
-                    pass
-        except OSError as error:
-            raise self._unplugged(error) from error
-        self._replies.append(SpiReply(number, tuple(data), self._clock()))
-        return number
-
-    def receive(self, timeout_s: float) -> SpiReply:  # noqa: D102  (inherited)
-        self._usable(timeout_s)
-        if not self._replies:
-            raise self._nothing_came(timeout_s)
-        return self._replies.popleft()
-
-    def abandon(self) -> None:  # noqa: D102
-        self._replies.clear()
-
-    def _release(self) -> None:
-        self._device.close()

@@ -15,8 +15,7 @@ from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
 if TYPE_CHECKING:
     from tactbench.devices.control import Control
     from tactbench.devices.driver import Driver, DriverSettings, Options, open_for
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
-    from tactbench.devices.emulation.scene_samples import SceneSamples
+    from tactbench.devices.emulation.virtual_time import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulator import (
         DeviceEmulator,
         EmulatorSettings,
@@ -58,6 +57,7 @@ if TYPE_CHECKING:
         RigEmulators,
         SceneEmulators,
         ScenePhysics,
+        SceneSamples,
         physics_of,
     )
     from tactbench.devices.sequence import Unwrap

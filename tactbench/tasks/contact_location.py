@@ -6,6 +6,7 @@ In its recordings a ball is pressed at places spread over the skin; each recordi
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import count
 
 from tactbench.plugin import (
     ForceRamp,
@@ -42,21 +43,14 @@ _STEPS = (0.7548776662466927, 0.5698402909980532)
 """Steps 1/g and 1/g², with g³ = g + 1, whose multiples modulo 1 cover a square evenly (Roberts 2018, R2)."""
 
 
-def _places_mm() -> Iterator[tuple[float, float]]:
-    """Yield endlessly many places [mm]; any consecutive places are spread evenly over the square."""
-    number = 0
-    while True:
-        number += 1
-        x, s = ((0.5 + number * step) % 1.0 for step in _STEPS)
-        yield REACH_MM * (2 * x - 1), REACH_MM * (2 * s - 1)
-
-
 def _scenes() -> Iterator[PlannedScene]:
-    places = _places_mm()
+    """Yield the recordings; any consecutive places are spread evenly over the square."""
+    order = count(1)
     for role, sessions, each in SESSIONS:
         for session in range(1, sessions + 1):
             for number in range(1, each + 1):
-                x, s = next(places)
+                place = next(order)
+                x, s = (REACH_MM * (2 * ((0.5 + place * step) % 1.0) - 1) for step in _STEPS)
                 scene = Scene(
                     name=f"place-{role}-{session}-{number}",
                     indenter=Indenter(radius=_RADIUS),

@@ -18,7 +18,6 @@ from tactbench.plugin import (
     TaskDescriptor,
     TaskSpec,
     hookimpl,
-    press_hold_release,
     sine,
     staircase,
 )
@@ -93,7 +92,6 @@ def tactbench_profiles() -> list[ProfileDescriptor]:
     """Return descriptors of the force profiles in the plugin interface, so that scenes can name them."""
     above_0 = 1e-3
     peak = {"unit": "N", "text": "the largest force"}
-    rise = {"unit": "s", "least": above_0, "text": "how long the way up to the first force takes"}
     hold = {"unit": "s", "text": "how long nothing presses before"}
     rate = {"unit": "Hz", "least": 1.0, "text": "samples a second of the reference clock"}
     return [
@@ -106,20 +104,13 @@ def tactbench_profiles() -> list[ProfileDescriptor]:
             hold=hold, rate=rate,
         ),
         _profile(
-            press_hold_release, "press-hold-release", "One press, held and released",
-            peak=peak, rise=rise,
-            dwell={"unit": "s", "text": "how long the force is held"},
-            release={"unit": "s", "least": above_0, "text": "how long releasing takes"},
-            rest={"unit": "s", "text": "how long nothing presses afterwards"},
-            hold=hold, rate=rate,
-        ),
-        _profile(
             sine, "sine", "A force that swings about a mean",
             mean={"unit": "N", "text": "about which it swings"},
             amplitude={"unit": "N", "text": "by how much, at most the mean"},
             frequency={"unit": "Hz", "least": 1e-3, "most": 1e3, "text": "periods a second"},
             periods={"unit": "1", "least": 1, "text": "how many, a whole number"},
-            rise=rise, hold=hold, rate=rate,
+            rise={"unit": "s", "least": above_0, "text": "how long the way up to the first force takes"},
+            hold=hold, rate=rate,
         ),
     ]  # fmt: skip
 

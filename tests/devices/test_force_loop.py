@@ -70,12 +70,6 @@ def test_the_limit_of_increments_without_filter_and_lag_is_the_closed_one(d):
     assert model.largest_stiffness() * T == pytest.approx(2 * math.sin(math.pi / (2 * (2 * d + 1))), rel=1e-5)
 
 
-def test_the_limit_with_a_delay_of_one_period():
-    # With a delay of one period and no lag the limit is k ki T = 1, whatever the filter.
-    model = _model(ki=1.0, motor_lag=_q(0.0, "s"))
-    assert model.largest_stiffness() == pytest.approx(100.0, rel=1e-5)
-
-
 # The motor ------------------------------------------------------------------------------------------------------------
 
 

@@ -15,7 +15,7 @@ from tactbench.devices import reading as module
 from tactbench.devices.reading import StreamQueue
 from tactbench.plugin import RigError, UsageError
 from tactbench.plugin.devices import LinkTimeout, Reading, StreamCounts
-from tests.devices.numbered import Far, NumberedDriver, numbered, stream_of
+from tests.devices.numbered import NumberedDriver, numbered, stream_of
 
 WIDE = stream_of("wide", 5000.0, 64)
 FORCE = stream_of("force", 1000.0, 6, "float64")
@@ -99,37 +99,6 @@ def test_the_same_rows_in_virtual_and_in_real_time(read, clock):
     assert counts == StreamCounts(received=1052, written=1051, duplicates=1, gaps=2)
     assert reading.counts == {"device: pieces": 6}
     assert reading.ended == ""
-
-
-def send(far: Far, far_force: Far, first: int, tenths: int) -> None:
-    """Tenths of a second of both devices, as fast as they are read."""
-    for k in range(first, first + tenths):
-        far.send(500 * k, 500)
-        far_force.send(100 * k, 100)
-        far.taken()
-        far_force.taken()
-
-
-def test_a_caller_that_stops_for_ten_seconds_loses_what_is_counted(clock):
-    with (
-        numbered(WIDE, clock) as (far, wide),
-        numbered(FORCE, clock) as (far_force, force),
-        Reading({"wide": wide, "force": force}, clock=clock) as reading,
-    ):
-        send(far, far_force, 0, 1)
-        blocks = reading.blocks(60.0)
-        came = [next(blocks) for _ in range(2)]
-        assert [block.stream for block in came] == ["wide", "force"]
-        send(far, far_force, 1, 100)
-        came += [next(blocks) for _ in range(2)]
-        send(far, far_force, 101, 1)
-        clock.now_ns += 61_000_000_000
-        came += blocks
-    kept = [*range(51 * 500), *range(101 * 500, 102 * 500)]
-    assert joined(came, "wide") == (kept, [101 * 500])
-    assert joined(came, "force") == ([*range(51 * 100), *range(101 * 100, 102 * 100)], [101 * 100])
-    assert reading.stream_counts["wide"] == StreamCounts(received=51_000, written=26_000, dropped=25_000)
-    assert reading.stream_counts["force"].dropped == 5000
 
 
 def test_a_device_that_is_gone_ends_the_reading(clock):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import select
 import socket
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tactbench.devices.emulation.line import Line
-from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer
+from tactbench.devices.emulation.real_time import RealTimeDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevice
 from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.plugin.devices import CanFrame, Link, SpiStep, open_link
 
@@ -77,13 +76,8 @@ def pty() -> Iterator[Pty]:
 @contextmanager
 def serving(emulator: BridgeEmulator) -> Iterator[Served]:
     """A bridge emulator on a pseudo-terminal, in real time."""
-    end = PseudoTerminal("{}")
-    server = RealTimeServer({"bridge": (Line(emulator), end)}, time.monotonic_ns)
-    server.start()
-    try:
-        yield Served(end.address, server.close)
-    finally:
-        server.close()
+    with RealTimeDevices({"bridge": EmulatedDevice("bytes", emulator)}) as devices:
+        yield Served(devices.addresses["bridge"].removeprefix("serial://").partition("?")[0], devices.close)
 
 
 class Served(NamedTuple):

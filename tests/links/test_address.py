@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tactbench.links.address import KINDS, parse_address
 from tactbench.plugin import UsageError
@@ -21,14 +19,15 @@ def test_examples_are_addresses(kind):
     [
         ("serial:///dev/ttyUSB0?baud=9600&parity=even&stop_bits=2", "serial", "/dev/ttyUSB0",
          {"baud": 9600, "parity": "even", "stop_bits": 2}),
-        ("serial:///dev/my%20port?baud=9600", "serial", "/dev/my port", {"baud": 9600}),
+        ("serial:///dev/my%20port?baud=9600", "serial", "/dev/my port",
+         {"baud": 9600, "parity": "none", "stop_bits": 1}),
         ("can://socketcan/can0?bitrate=1000000", "can", "socketcan/can0", {"bitrate": 1000000}),
         ("can://slcan//dev/ttyACM0?bitrate=500000&sleep_after_open=0.5", "can", "slcan//dev/ttyACM0",
          {"bitrate": 500000, "sleep_after_open": 0.5}),
         ("udp://192.168.1.1:49152", "udp", "192.168.1.1:49152", {}),
         ("udp://[::1]:49152", "udp", "[::1]:49152", {}),
-        ("spi://spidev/0.1?speed_hz=4400000&mode=3", "spi/spidev", "0.1", {"speed_hz": 4400000, "mode": 3}),
-        ("spi://bridge/socket://10.0.0.2:4001?speed_hz=1", "spi/bridge", "socket://10.0.0.2:4001", {"speed_hz": 1}),
+        ("spi://bridge/socket://10.0.0.2:4001?speed_hz=1&mode=3", "spi/bridge", "socket://10.0.0.2:4001",
+         {"speed_hz": 1, "mode": 3, "baud": 115200}),
     ],
 )  # fmt: skip
 def test_parts(text, kind, target, options):
@@ -41,31 +40,20 @@ def test_parts(text, kind, target, options):
         ("/dev/ttyUSB0", "serial:///dev/ttyUSB0?baud=115200"),
         ("serail:///dev/ttyUSB0?baud=9600", "'serial'"),
         ("can://sockcan/can0", "'socketcan'"),
+        ("spi://spidev/0.0?speed_hz=4400000", "'spi/bridge'"),
         ("serial:///dev/ttyUSB0?baut=9600", "'baud'"),
         ("serial:///dev/ttyUSB0", "'baud'"),
         ("serial:///dev/ttyUSB0?baud=fast", "'baud'"),
-        ("serial:///dev/ttyUSB0?baud=9600&baud=9600", "twice"),
         ("serial:///dev/ttyUSB0?baud=9600&parity=mark", "'odd'"),
-        ("can://virtual/", "target"),
         ("udp://192.168.1.1", "port"),
         ("udp://192.168.1.1:70000", "port"),
-        ("spi://spidev/0.0?speed_hz=4400000&mode=4", "3"),
+        ("spi://bridge/x?speed_hz=4400000&mode=4", "3"),
     ],
 )
 def test_an_error_names_what_is_wrong_or_expected(text, named):
     with pytest.raises(UsageError) as raised:
-        parse_address(text)
+        open_link(text)
     assert named in str(raised.value)
-
-
-@settings(max_examples=25)
-@given(st.text(max_size=40) | st.builds("{}://{}?{}".format, st.sampled_from([*KINDS]), st.text(), st.text()))
-def test_any_text_is_an_address_or_a_usage_error(text):
-    try:
-        kind, _, _ = parse_address(text)
-    except UsageError as error:
-        kind, hint = None, error.hint
-    assert kind in KINDS or hint
 
 
 @pytest.mark.parametrize(
@@ -75,7 +63,6 @@ def test_any_text_is_an_address_or_a_usage_error(text):
         ("can://slcan/dev/there-is-none?bitrate=1000000", "can://slcan//dev/ttyACM0"),
         ("can://slcan//dev/there?bitrte=1000000", "'bitrate'"),
         ("can://pcan/PCAN_USBBUS1", "can://pcan/PCAN_USBBUS1"),
-        ("spi://spidev/zero?speed_hz=1", "tactbench[spi]"),
     ],
 )
 def test_a_link_that_does_not_open_names_the_next_step(address, named):

@@ -1,15 +1,12 @@
-"""Serial and CAN devices where fcntl, termios and fork are missing, as on Windows: tried by taking them away."""
+"""Drivers and emulators where fcntl, termios and fork are missing, as on Windows: tried by taking them away."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-import threading
 
 import pytest
-
-from tests.links.ends import pty
 
 SITE = """
 import os, sys
@@ -27,17 +24,6 @@ class Gone:
 sys.meta_path.insert(0, Gone())
 for name in ("fork", "forkpty", "register_at_fork"):
     delattr(os, name)
-"""
-SPEAKS = """
-import sys
-from tactbench.plugin.devices import CanFrame, open_link
-
-with open_link(f"serial://{sys.argv[1]}?baud=9600") as link:
-    link.write(b"ask")
-    assert link.read(10.0).data == b"A"
-with open_link(f"can://slcan/{sys.argv[1]}?bitrate=1000000&sleep_after_open=0") as link:
-    link.send(CanFrame(0x123, b"B"))
-    assert link.receive(10.0).data == b"C"
 """
 RIG = """
 rig: bench
@@ -58,22 +44,6 @@ def without_posix(tmp_path):
         return done
 
     return run
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-def test_a_serial_port_and_a_can_adapter_are_spoken_to(without_posix):
-    with pty() as far:
-
-        def answer():
-            far.read_until(b"ask")
-            far.write(b"A")
-            far.read_until(b"t123142\r")
-            far.write(b"t123143\r")
-
-        thread = threading.Thread(target=answer)
-        thread.start()
-        without_posix("-c", SPEAKS, far.name)
-        thread.join()
 
 
 def test_drivers_and_emulators_record_a_press(without_posix, tmp_path):

@@ -10,8 +10,7 @@ import pytest
 from tactbench.rigs.twin.contact.newton import NewtonSolver, Solution
 from tactbench.rigs.twin.contact.press import Press, at_rest
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.contact.slide_table import dragged_state
-from tactbench.rigs.twin.contact.tangential import tangential_of
+from tactbench.rigs.twin.contact.tangential import dragged_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tests.oracles.boundary_elements import Layer, paraboloid_mm, pressed
 from tests.oracles.closed_forms import CattaneoMindlin, Hertz

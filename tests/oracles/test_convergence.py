@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import load_object
-from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.shell import with_core
 from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC

@@ -7,10 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.rigs.twin.effects.bristle import bristle, coefficient
-from tactbench.rigs.twin.effects.skin_mode import Mode, shaken, slip_s, swing
-from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
-from tactbench.rigs.twin.partial_slip import share_of_force, sliding_stiffness, stick_ratio
+from tactbench.rigs.twin.contact.tangential import share_of_force, sliding_stiffness, stick_ratio
+from tactbench.rigs.twin.effects.stick_slip import (
+    STICK,
+    Dragged,
+    Drive,
+    Mode,
+    bristle,
+    coefficient,
+    shaken,
+    slip_s,
+    swing,
+)
 
 STATIC, KINETIC, LOAD_N, STIFFNESS, OMEGA = 0.8, 0.5, 2.0, 3.0, 2.0 * math.pi * 300.0
 
@@ -60,7 +68,7 @@ def test_stick_slip_has_the_period_and_the_drop_of_two_coefficients(speed):
     found = Dragged(drive(speed, 0.0, 40.0 * period_s(speed)))
     # Instants to 1e-11 of the run.
     np.testing.assert_allclose(np.diff(found.let_go_s), period_s(speed), rtol=1e-7)
-    let_go, caught = (found(t).displacement_mm for t in (found.let_go_s[1:9], found.caught_s[2:10]))
+    let_go, caught = (found(t).displacement_mm for t in (found.let_go_s[1:9], found._begin[found._kind == STICK][2:10]))
     # 2 (mu_s - mu_k) N, at any speed without damping.
     np.testing.assert_allclose(let_go - caught, 2.0 * (STATIC - KINETIC) * LOAD_N / STIFFNESS, rtol=1e-7)
 
@@ -90,7 +98,7 @@ def test_the_bristle():
     path = bristle(t, -7.0, np.full(1000, 0.3), 0.2)
     # F v less the change of stored energy k z²/2 is k |v| z²/g; differences over 0.3 ms.
     assert (path * -7.0 - np.gradient(0.5 * path**2, t)).min() >= -1e-4
-    law = [coefficient(v, STATIC, KINETIC, 5.0) for v in (0.0, 5.0, 1e6)]
+    law = coefficient(np.array([0.0, 5.0, 1e6]), STATIC, KINETIC, 5.0)
     assert law == pytest.approx([STATIC, KINETIC + (STATIC - KINETIC) / math.e, KINETIC], abs=1e-15)
 
 

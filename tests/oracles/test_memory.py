@@ -1,4 +1,4 @@
-"""Lags, low-passes and the heated core against closed forms."""
+"""The heated core against a quadrature."""
 
 from __future__ import annotations
 
@@ -6,30 +6,14 @@ import math
 
 import numpy as np
 
-from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.effects.heat import HeatedCore
 
-ROUNDING = 1e-12
-"""Relative errors of exact filters: some thousand operations, each off by 1e-16."""
 CORE = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)
 
 
 def order(errors: list[float]) -> float:
     """Return the order seen between the two finest of halved steps."""
     return math.log2(errors[-2] / errors[-1])
-
-
-def test_a_standard_linear_solid_under_a_step_of_stress():
-    """``e(t) = s (1/E0 + (1 - exp(-t/tau))/E1)``."""
-    stress, first, second, tau = 0.3, 0.8, 2.5, 7.0
-    steps = np.random.default_rng(1).choice([1e-3, 0.1, 3.0, 40.0], 200)
-    # A repeated time stamp makes the step: stress jumps while no time passes.
-    t_s = np.concatenate([[0.0, 0.0], np.cumsum(steps)])
-    load = np.full(t_s.size, stress)
-    load[0] = 0.0
-    found = load / first + lag(t_s, load, tau) / second
-    expected = stress * (1 / first - np.expm1(-t_s / tau) / second)
-    np.testing.assert_allclose(found[1:], expected[1:], rtol=ROUNDING)
 
 
 def test_a_heated_core_under_a_growing_contact_is_of_second_order():

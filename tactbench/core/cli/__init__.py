@@ -69,7 +69,7 @@ class LazyGroup(click.Group):
             formatter.write_dl(rows)
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(tactbench.__version__, prog_name="tactbench")
 def cli() -> None:
     """Benchmark tactile sensors, and show what each score costs in time.

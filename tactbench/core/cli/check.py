@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import YES, format_option
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from tactbench.core.conformance.check import Subject
-    from tactbench.core.conformance.run import CheckReport
-    from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.cli.grid import print_fields, print_records
+from tactbench.core.cli.options import format_option
+from tactbench.core.conformance.check import CHECKS, KINDS
+from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import json_text
 
 _FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -24,34 +23,20 @@ _FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 @click.argument("name", required=False)
 @click.option("--list", "listed", is_flag=True, help="List the checks with their purpose and kinds of plugins.")
 @click.option("--recording", type=_FILE, metavar="FILE", help="Also check this recording of the sensor.")
-@click.option("--rig-file", type=_FILE, metavar="FILE",
-              help="Also open the device's line, or press with the rig, by this rig file; prompts first.")  # fmt: skip
 @click.option("--root", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
               help="Folder with the files of a data set. Default: the files fetched before.")  # fmt: skip
-@YES
 @format_option("table", "json")
 @click.pass_context
 def command(
-    ctx: click.Context, name: str | None, listed: bool, recording: Path | None, rig_file: Path | None,
-    root: Path | None, yes: bool, shape: str,
-) -> None:  # fmt: skip
+    ctx: click.Context, name: str | None, listed: bool, recording: Path | None, root: Path | None, shape: str
+) -> None:
     """Check that a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
 
-    NAME is that of a component, a mapping file, or a plugin with all its components. Without --rig-file no device
-    is opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
+    NAME is that of a component, a mapping file, or a plugin with all its components. No device is
+    opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
-    from tactbench.core.cli.grid import print_fields, print_records
-    from tactbench.core.conformance.check import CHECKS, KINDS, Mode
-    from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
-    from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rigs import load_rig_file
-    from tactbench.core.study.operator import TerminalOperator
-    from tactbench.core.tables.terminal import remark
-    from tactbench.core.tables.text import json_text
-
     if listed:
-        checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds), "mode": one.mode,
+        checks = [{"check": one.name, "of": "all" if one.kinds == KINDS else ", ".join(one.kinds),
                    "why": one.why, "do": one.cure} for one in CHECKS]  # fmt: skip
         print_records(checks, shape, title="checks", columns=("check", "of", "why"))
         return
@@ -67,19 +52,9 @@ def command(
             raise
         subjects = []
         remark(error.message)
-    modes: list[Mode] = ["passive"]
-    if recording is not None:
-        modes.append("recording")
-        if not wrong and all(one.kind != "sensor" for one in subjects):
-            raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
-    if rig_file is not None:
-        modes.append("invasive")
-        _confirm(subjects, load_rig_file(rig_file, registry), yes)
-    operator = TerminalOperator(yes=yes)
-    reports = [
-        run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator, root=root)
-        for one in subjects
-    ]
+    if recording is not None and not wrong and all(one.kind != "sensor" for one in subjects):
+        raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
+    reports = [run_checks(one, recording=recording, root=root) for one in subjects]
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
@@ -90,31 +65,12 @@ def command(
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
 
 
-def _confirm(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
-    """Prompt before devices are opened and moved; raises UsageError without a terminal, or for another rig's file."""
-    from tactbench.core.conformance.press import REAL_N
-    from tactbench.core.errors import UsageError
-
-    rigs = [one.name for one in subjects if one.kind == "rig"]
-    if len(rigs) == len(subjects) == 1:
-        file.checked_for(rigs[0])
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise UsageError("--rig-file needs a confirmation before anything moves, and stdin is no terminal.",
-                         hint="Run it in a terminal, or add --yes if the rig is clear.")  # fmt: skip
-    click.confirm(
-        f"Checking opens the communication lines of devices and sensors; a rig presses a sensor "
-        f"twice to {REAL_N:g} N. Is the rig clear?", abort=True, err=True,
-    )  # fmt: skip
-
-
 def _plain(report: CheckReport) -> dict[str, object]:
     import tactbench
 
     return {
         "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level,
-        "kit": tactbench.__version__, "modes": list(report.modes), "checks": [one._asdict() for one in report.outcomes],
+        "kit": tactbench.__version__, "checks": [one._asdict() for one in report.outcomes],
     }  # fmt: skip
 
 

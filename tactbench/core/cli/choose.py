@@ -7,6 +7,15 @@ from pathlib import Path
 import click
 
 from tactbench.core.cli.options import ABOVE_0, DEFAULT_FOLDER, format_option
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard.formats import json_array
+from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, with_requirements
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.view import View, grids
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.study.results import is_results, opened, shown_rows
+from tactbench.core.study.shipped import shipped_rows
+from tactbench.core.tables.terminal import remark, show
 
 _PREFERRED = "deployable"
 
@@ -28,16 +37,6 @@ def command(
     FOLDER is that of `run --out`. Default: tactbench-results, or the results installed with tactbench if this folder
     has no results of the task.
     """
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.formats import json_array
-    from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, with_requirements
-    from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.view import View, grids
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.study.results import is_results, opened, shown_rows
-    from tactbench.core.study.shipped import shipped_rows
-    from tactbench.core.tables.terminal import remark, show
-
     registry = load_registry()
     task = registry.tasks[task_name].spec
     own = folder or DEFAULT_FOLDER

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import print_records, print_tables
 from tactbench.core.cli.options import JOBS, RESULTS, format_option, options
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
+from tactbench.core.cost.precision import Skipped, diagrams, measured, precise
+from tactbench.core.errors import UsageError
+from tactbench.core.files import replace_file, writable
+from tactbench.core.matrix.run import EngineChoice
+from tactbench.core.plugins.declared import declared_in, with_declared
+from tactbench.core.plugins.interfaces import CostPoint, CostStudy
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.report.figures.style import save, styled
+from tactbench.core.report.figures.trade import draw_precision, trade_table, write_trade
 from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.spec.matrix import REPLICATES
+from tactbench.core.spec.matrix import REPLICATES, MatrixSpec, TaskChoice
+from tactbench.core.study.progress import progress
+from tactbench.core.study.shipped import matrix_called
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import json_text
 
 
 @click.command(name="cost")
@@ -24,7 +41,7 @@ from tactbench.core.spec.matrix import REPLICATES
     click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
                  help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
-    click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
+    click.option("--rounds", type=click.IntRange(min=1), default=5, metavar="N",
                  help="Number of timing rounds, for --twin without --task."),
     JOBS,
     RESULTS,
@@ -39,14 +56,10 @@ def command(
     solver (rung) and the tolerance of the simulation. Files are written into the folder cost of the result folder;
     finished cells there are reused.
     """
-    from tactbench.core.errors import UsageError
-
     if twin and task is None:
         if any(options_given.values()):
             raise UsageError("--twin without --task takes --sensor and --rounds only.", hint="Leave the others out.")
-        from tactbench.core.cli.cost_twin import show_twin
-
-        show_twin(sensors, out / "cost", shape, rounds)
+        _show_twin(sensors, out / "cost", shape, rounds)
         return
     if task is None or (len(sensors) != 1 and not twin):
         raise UsageError(
@@ -61,18 +74,6 @@ def _show_knobs(
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
     """Measure scores and times with varied settings of an estimator or the simulation; print and write the results."""
-    from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.run import EngineChoice
-    from tactbench.core.plugins.declared import declared_in, with_declared
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.figures.trade import trade_table, write_trade
-    from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.shipped import matrix_called
-    from tactbench.core.tables.terminal import remark
-
     registry = with_declared(load_registry(), declared_in(recordings))
     spec = registry.tasks[task].spec
     rig = registry.rigs[registry.first_rig("simulated" if recordings is None else "replays")]
@@ -98,3 +99,41 @@ def _show_knobs(
         records += ({"sensor": sensor, **one} for one in known["settings"])
     if shape != "table":
         print_records(records, shape)
+
+
+def _show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> None:
+    """Measure errors and times of the simulated rig for `sensors` (default: the matrix's), in `rounds` rounds.
+
+    The table is printed in the format `shape`; table and figure are written into the folder `out`.
+    """
+    registry = load_registry()
+    name = registry.first_rig("simulated")
+    where = registry.rigs[name].work_precision
+    if where is None:
+        raise UsageError(f"The rig {name!r} declares no study of its accuracy against time.", hint="Use the rig twin.")
+    found: list[CostPoint | Skipped] = []
+    with progress() as display:
+        for sensor in sensors or matrix_called().sensors:
+            study: CostStudy = load_object(where)(registry.sensors[sensor], rounds=rounds)
+            found += measured(study, sensor, display)
+    points = [one for one in found if isinstance(one, CostPoint)]
+    records = [
+        {
+            "sensor": one.subject, "observable": one.observable, "setting": one.label, "front": one in precise(group),
+            "seconds": one.seconds, "error_rms": one.error, "error_worst": one.worst, "unit": one.unit,
+            "noise": one.floor if math.isfinite(one.floor) else None, "reason": "",
+        }
+        for group in diagrams(points).values()
+        for one in group
+    ]  # fmt: skip
+    nothing = dict.fromkeys(records[0] if records else ())
+    records += [{**nothing, "sensor": one.subject, "setting": one.label, "reason": one.reason}
+                for one in found if isinstance(one, Skipped)]  # fmt: skip
+    print_records(records, shape, title=study.title)
+    remark(study.reference)
+    with writable(out), styled():
+        out.mkdir(parents=True, exist_ok=True)
+        replace_file(out / f"{name}.json", (json_text(records, indent=1) + "\n").encode())
+        if points:
+            save(draw_precision(points, study.title), out / name)
+    remark(f"Files: {out / name}.json{', .png, .pdf' if points else ''}")

@@ -6,6 +6,9 @@ import click
 
 from tactbench.core.cli.grid import GRID_FORMATS, print_records
 from tactbench.core.cli.options import format_option
+from tactbench.core.errors import ConfigError
+from tactbench.core.recording.datasets import cache, datasets
+from tactbench.core.tables.terminal import remark
 
 
 @click.command(name="datasets")
@@ -15,10 +18,6 @@ def command(shape: str) -> None:
 
     `tactbench run --dataset NAME` fetches missing files, once. A data set that cannot be fetched needs --root.
     """
-    from tactbench.core.errors import ConfigError
-    from tactbench.core.recording.datasets import cache, datasets
-    from tactbench.core.tables.terminal import remark
-
     records = []
     for name, one in datasets().items():
         try:

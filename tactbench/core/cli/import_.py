@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import click
 
 from tactbench.core.cli.grid import field_text, print_fields
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tactbench.core.recording.mapping import ImportReport
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.recording.mapping import ImportReport, import_tables
+from tactbench.core.recording.mapping.importing import import_log
+from tactbench.core.spec.scene import Role
+from tactbench.core.spec.yaml_file import plain_value
+from tactbench.core.study.progress import progress
 
 MOST_NAMED = 12
 """Largest number of findings, and of files left out, that are printed; the most severe findings come first."""
@@ -43,12 +45,6 @@ def command(
     Either all recordings are written, or none. Values marked as "no sample" are counted. See docs/mappings.md. Exit
     code 1 if `inspect` finds an error in the recordings.
     """
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.recording.mapping import import_tables
-    from tactbench.core.recording.mapping.importing import import_log
-    from tactbench.core.spec.scene import Role
-    from tactbench.core.study.progress import progress
-
     if sensor is None:
         if options or labels:
             raise click.UsageError("--option and --label are for logs: give --sensor as well.")
@@ -71,8 +67,6 @@ def command(
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
     """Return ``key=value`` options as a dict; values are read as in YAML: a number, a boolean or a text."""
-    from tactbench.core.spec.yaml_file import plain_value
-
     found: dict[str, Any] = {}
     for text in given:
         key, separator, value = text.partition("=")

@@ -21,28 +21,33 @@ _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
 @click.command(name="inspect")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @format_option("table", "json")
-@click.option("--salvage", is_flag=True, help="Read an unfinished file (….partial), after a crash or while recording.")
+@click.option("--salvage", is_flag=True, help="Show an unfinished FILE (….partial), also while it grows.")
 @click.option("--rescue", type=click.Path(path_type=Path), metavar="OUT",
-              help="Convert the one unfinished FILE into the recording OUT.")  # fmt: skip
+              help="Convert one FILE that is unfinished (….partial) into the recording OUT.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool, rescue: Path | None) -> None:
     """Show the contents of recordings (streams, channels, rates), and check their health.
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
-    from tactbench.core.recording import partial as unfinished
+    from tempfile import TemporaryDirectory
+
+    from tactbench.core.recording.partial import rescue as convert
     from tactbench.core.recording.reader import open_recording
 
     if rescue is not None:
         if len(files) != 1:
             raise click.UsageError("--rescue OUT takes exactly one FILE.")
-        unfinished.rescue(files[0], rescue)
+        convert(files[0], rescue)
         files = (rescue,)
-    opened = unfinished.salvage if salvage and rescue is None else open_recording
     described = []
     for path in files:
-        with opened(path) as recording:
-            described.append(describe(recording))
+        with TemporaryDirectory() as folder:
+            shown = Path(folder) / "salvaged.h5" if salvage and rescue is None else path
+            if shown != path:
+                convert(path, shown)
+            with open_recording(shown) as recording:
+                described.append({**describe(recording), "file": str(path)})
         if shape == "table":
             _print(described[-1])
     if shape == "json":
@@ -60,8 +65,7 @@ def describe(recording: Recording) -> dict[str, Any]:
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     return {
-        "file": str(recording.path), "complete": recording.complete,
-        "content_sha256": recording.verify() if recording.complete else recording.content_digest(),
+        "content_sha256": recording.verify(),
         "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}), "sensor": meta.sensor.name,
         "streams": [{"of": "sensor" if name in own else "reference", **_stream(recording, name)}
                     for name in recording.stream_names],
@@ -92,12 +96,11 @@ def _print(about: dict[str, Any]) -> None:
     meta = about["meta"]
     effects = {taken: [one["effect"] + " (forced)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
                for taken in (True, False)}  # fmt: skip
-    verified = "verified" if about["complete"] else "unfinished: an interrupted or running recording"
     stated: dict[str, Any] = {
         "file": about["file"], "sensor": about["sensor"],
         **{name: value for name, value in meta.items() if name not in _STRUCTURES},
         **{f"clock of {stream}": _clock(clock) for stream, clock in meta["clocks"].items()},
-        "effects": effects[True], "left out": effects[False], "content": f"{about['content_sha256'][:16]} ({verified})",
+        "effects": effects[True], "left out": effects[False], "content": f"{about['content_sha256'][:16]} (verified)",
     }  # fmt: skip
     print_fields([(name, text) for name, value in stated.items() if (text := field_text(value))])
     click.echo()

@@ -5,16 +5,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from tactbench.core.cli.options import DEFAULT_FOLDER, options
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.files import replace_file
+from tactbench.core.leaderboard.formats import SUFFIXES, rendered
+from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.view import View, document, known_columns
+from tactbench.core.leaderboard.view import best as best_of
+from tactbench.core.study.results import opened, shown_rows, table_of
 from tactbench.core.tables.terminal import WITHOUT_EDGE, show
-
-if TYPE_CHECKING:
-    from tactbench.core.leaderboard.table import Table
-    from tactbench.core.leaderboard.view import View
 
 TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
 FOR_PEOPLE = ("table", "md", "latex")
@@ -33,19 +36,13 @@ FOR_PEOPLE = ("table", "md", "latex")
     click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
                  help="Output format. Default: table, or the format of the suffix of --to."),
     click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-                 help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx."),
+                 help="Write a file: .txt, .md, .csv, .json, .tex."),
 )  # fmt: skip
 def command(
     folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is that of `run --out`."""
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.formats import SUFFIXES
-    from tactbench.core.leaderboard.view import View, known_columns
-    from tactbench.core.leaderboard.view import best as best_of
-    from tactbench.core.study.results import opened, shown_rows, table_of
-
     shape = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
     if shape is None:
         raise UsageError(f"The suffix of {to} is not that of a table format.",
@@ -60,8 +57,6 @@ def command(
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
     """Return the rows that pass all filters; raises UsageError for an unknown name, or if no row is left."""
-    from tactbench.core.errors import UnknownNameError, UsageError
-
     kept = rows
     for key, chosen in filters.items():
         known = {str(row[key]) for row in rows if row[key] is not None}
@@ -82,18 +77,13 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     Parameters
     ----------
     shape
-        Format: one of `TABLE_FORMATS`; for a file also ``parquet`` or ``xlsx``.
+        Format: one of `TABLE_FORMATS`.
 
     Raises
     ------
     UsageError
         If the file cannot be written.
     """
-    from tactbench.core.errors import UsageError
-    from tactbench.core.files import replace_file
-    from tactbench.core.leaderboard.formats import rendered
-    from tactbench.core.leaderboard.view import document
-
     if shape == "table" and to is None and sys.stdout.isatty():
         show(document(table, view))
         return

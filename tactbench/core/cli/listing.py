@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from tactbench.core.cli.grid import print_fields, print_records
 from tactbench.core.cli.options import format_option
+from tactbench.core.plugins.registry import Registry, load_registry
+from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import json_text
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.registry import Registry
 
 PLUGINS = "plugins"
 FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "indenters", "profiles")
@@ -27,8 +26,6 @@ def command(ctx: click.Context, family: str | None, shape: str) -> None:
     Devices are force sensors and motors. `plugins` lists installed plugins, with the reason if one could not be used;
     the exit code is then 1.
     """
-    from tactbench.core.plugins.registry import load_registry
-
     registry = load_registry()
     if family == PLUGINS:
         _plugins(registry, shape)
@@ -67,8 +64,6 @@ def _plugins(registry: Registry, shape: str) -> None:
 
 def remark_failed(registry: Registry) -> None:
     """Print the names of plugins that could not be loaded, if any, on stderr."""
-    from tactbench.core.tables.terminal import remark
-
     if registry.failures or registry.refused:
         names = [row.entry_point for row in registry.failures] + [error.message for error in registry.refused]
         remark(f"Some plugins could not be used: {'; '.join(names)}. See `tactbench list plugins`.")

@@ -6,6 +6,11 @@ from pathlib import Path
 
 import click
 
+from tactbench.core.leaderboard.formats import write_tables
+from tactbench.core.matrix.merge import merge
+from tactbench.core.matrix.store import Store
+from tactbench.core.study.results import shown_rows, table_of
+from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line
 
 
@@ -21,9 +26,6 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     are listed. If two hosts have finished a cell with the same scores, one host's row is kept whole: times of
     different hosts are never mixed.
     """
-    from tactbench.core.matrix.merge import merge
-    from tactbench.core.tables.terminal import remark
-
     merged = merge(folders, out, also=_write_tables)
     remark(f"{len(merged.rows)} cells, {merged.recordings} recordings.")
     for sentence in merged.left_out:
@@ -35,9 +37,5 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 
 def _write_tables(merged: Path) -> None:
     """Write ``leaderboard.md``, ``.csv`` and ``.json`` into a merged result folder."""
-    from tactbench.core.leaderboard.formats import write_tables
-    from tactbench.core.matrix.store import Store
-    from tactbench.core.study.results import shown_rows, table_of
-
     store = Store(merged)
     write_tables(table_of(store, shown_rows(store)), merged)

@@ -9,6 +9,10 @@ from string import Template
 
 import click
 
+from tactbench.core.errors import UsageError
+from tactbench.core.plugins.hookspecs import API_VERSION
+from tactbench.core.plugins.registry import load_registry
+
 KINDS = ("sensor", "rig", "task", "estimator", "effect")
 NAME = r"[a-z][a-z0-9]*(-[a-z0-9]+)*"
 _OPTIONS = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
@@ -21,15 +25,12 @@ _OPTIONS = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal 
 @click.argument("kind", type=click.Choice(KINDS))
 @click.argument("name")
 @click.option("--into", type=click.Path(path_type=Path, file_okay=False), default=Path(), metavar="DIR",
-              help="Folder of the package; created if missing. Default: the current folder.")  # fmt: skip
+              help="Folder of the package; created if missing.")  # fmt: skip
 def command(kind: str, name: str, into: Path) -> None:
     """Write an installable package with a plugin that already runs: a sensor, rig, task, estimator or effect.
 
     NAME is lower case, with hyphens. Nothing is overwritten. See docs/tutorial.md.
     """
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_registry
-
     if not re.fullmatch(NAME, name) or name == "all":
         raise UsageError(
             f"{name!r} is not a valid name for a {kind}.",
@@ -52,8 +53,6 @@ def command(kind: str, name: str, into: Path) -> None:
 
 def rendered(kind: str, name: str) -> dict[str, str]:
     """Return the texts of the files of a new plugin package, by path."""
-    from tactbench.core.plugins.hookspecs import API_VERSION
-
     module = f"tactbench_{name.replace('-', '_')}"
     words = {"kind": kind, "name": name, "module": module, "distribution": f"tactbench-{name}",
              "title": name.replace("-", " ").capitalize(), "api": str(API_VERSION)}  # fmt: skip

@@ -40,12 +40,12 @@ def options(*several: Callable[[Command], Command]) -> Callable[[Command], Comma
 
 def format_option(*shapes: str) -> Callable[[Command], Command]:
     """Return the option ``--format`` with the choices `shapes`, the first of which is the default."""
-    return click.option("--format", "shape", type=click.Choice(shapes), default=shapes[0], show_default=True,
+    return click.option("--format", "shape", type=click.Choice(shapes), default=shapes[0],
                         help="Output format.")  # fmt: skip
 
 
 YES = click.option("--yes", is_flag=True, help="Do not prompt.")
-RESULTS = click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
+RESULTS = click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER,
                        metavar="DIR", help="Result folder.")  # fmt: skip
 JOBS = click.option("--jobs", type=click.IntRange(min=1), metavar="N",
                     help="Parallel worker processes. Default: one per usable core.")  # fmt: skip

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.acquisition import acquire
+from tactbench.core.cli.live import LiveView
 from tactbench.core.cli.options import SIMULATION, YES
+from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.plugins.interfaces import RecordingRequest, Rig
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.plugins.rigs import load_rig_file, rig_of
+from tactbench.core.provenance.gather import gather
+from tactbench.core.recording.image import require_free
+from tactbench.core.recording.reader import read_meta
+from tactbench.core.study.operator import TerminalOperator
+from tactbench.core.study.scenes import scene_of
+from tactbench.core.study.simulation import simulation_of
+from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.interfaces import Operator, Rig
-    from tactbench.core.plugins.registry import Registry
-    from tactbench.core.spec.rig_file import RigFile
 
 
 @click.command(name="record")
@@ -26,32 +34,15 @@ if TYPE_CHECKING:
               help="Force profile with its parameters: ramp:force=5,duration=60 (the default), "
                    "sine:mean=2,frequency=0.5.")  # fmt: skip
 @SIMULATION
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
-@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
+@click.option("--live", is_flag=True, help="Show force, planned force and rates while recording.")
 def command(
     sensor: str, rig: str | None, rig_file: str | None, indenter: str | None, profile: str | None, effects: str | None,
     settings: tuple[str, ...], seed: int, out: Path, yes: bool, live: bool,
 ) -> None:  # fmt: skip
     """Record one scene into one file; `tactbench list` names indenters and profiles."""
-    import time
-    from contextlib import ExitStack, nullcontext
-
-    from tactbench.core.acquisition import acquire
-    from tactbench.core.cli.live import LiveView
-    from tactbench.core.errors import TactbenchError
-    from tactbench.core.plugins.interfaces import RecordingRequest
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rigs import load_rig_file
-    from tactbench.core.provenance.gather import gather
-    from tactbench.core.recording.image import require_free
-    from tactbench.core.recording.reader import read_meta
-    from tactbench.core.study.operator import TerminalOperator
-    from tactbench.core.study.scenes import scene_of
-    from tactbench.core.study.simulation import simulation_of
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = scene_of(registry, descriptor, indenter, profile)
@@ -59,21 +50,21 @@ def command(
     rig = rig or (devices.rig if devices else registry.first_rig("simulated"))
     scene = scene.simulated_as(simulation_of(registry, rig, [sensor], effects, settings))
     require_free(out)
-    emulated = devices is not None and devices.emulated
-    mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
-    provenance = gather(registry)
+    if registry.rigs[rig].replays:
+        raise UsageError(
+            f"The rig {rig!r} cannot record: it only replays recordings that exist already.",
+            hint="Use --rig twin, or another rig that records.",
+        )
     try:
-        with ExitStack() as stack:
-            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}")) if live else None
-            operator = TerminalOperator(yes=yes, paused=view.paused if view else nullcontext)
-            built = _built(registry, rig, devices, operator)
+        with LiveView(scene, f"{sensor} on {rig}, {scene.indenter}", drawn=live) as view:
+            operator = TerminalOperator(yes=yes, paused=view.paused)
+            built: Rig = rig_of(rig, registry, None, devices, operator)  # type: ignore[assignment]
             request = RecordingRequest(
-                descriptor, registry.rigs[rig], scene, out, seed, rig_file=devices, name=out.stem, provenance=provenance
-            )
-            meta = acquire(
-                built, request, clock=time.perf_counter, opened=view.begin if view else None,
-                watch=view.watch if view else None, complete_interrupted=True,
+                descriptor, registry.rigs[rig], scene, out, seed, rig_file=devices, name=out.stem,
+                provenance=gather(registry),
             )  # fmt: skip
+            meta = acquire(built, request, clock=time.perf_counter, opened=view.begin, watch=view.watch,
+                           complete_interrupted=True)  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
         if out.exists() and read_meta(out).excluded.startswith("interrupted"):
             remark(f"The samples recorded until the interruption are in {out}, which is left out of every evaluation.")
@@ -88,17 +79,3 @@ def command(
     if meta.excluded:
         remark(f"This recording is left out of scores unless --include-incomplete is given: {meta.excluded}.")
         click.get_current_context().exit(1)
-
-
-def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.rigs import rig_of
-
-    # With a folder a rig that replays can be built too, and be refused by its name.
-    rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]
-    if not hasattr(rig, "open"):
-        raise UsageError(
-            f"The rig {name!r} cannot record: it only replays recordings that exist already.",
-            hint="Use --rig twin, or another rig that records.",
-        )
-    return rig

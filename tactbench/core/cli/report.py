@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
+from tactbench.core.cli.grid import print_tables
 from tactbench.core.cli.options import DEFAULT_FOLDER
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.page import make_report
+from tactbench.core.report.published import published_table
+from tactbench.core.report.results import open_results
+from tactbench.core.study.progress import progress
+from tactbench.core.study.results import opened
+from tactbench.core.tables.terminal import remark
 
 
 @click.command(name="report")
@@ -16,15 +24,6 @@ from tactbench.core.cli.options import DEFAULT_FOLDER
 @click.pass_context
 def command(ctx: click.Context, folder: Path, out: Path | None) -> None:
     """Write one HTML page of all results in FOLDER (that of `run --out`), and print published scores beside ours."""
-    from tactbench.core.cli.grid import print_tables
-    from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.page import make_report
-    from tactbench.core.report.published import published_table
-    from tactbench.core.report.results import open_results
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.results import opened
-    from tactbench.core.tables.terminal import remark
-
     store, out = opened(folder), out or folder / "report"
     results = open_results(store, load_registry())
     with progress() as display:

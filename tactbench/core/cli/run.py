@@ -9,8 +9,15 @@ from typing import Any
 import click
 
 from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table
+from tactbench.core.cli.listing import remark_failed
 from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
+from tactbench.core.leaderboard.formats import write_tables
+from tactbench.core.leaderboard.table import over_all
+from tactbench.core.leaderboard.view import DEFAULT_VIEW
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
+from tactbench.core.study.results import table_of
+from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut
 
@@ -39,7 +46,6 @@ from tactbench.core.tables.text import command_line, cut
                  help="Include recordings with more missing samples than their rig file allows."),
     SIMULATION,
     click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
-                 show_default=True,
                  help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
     JOBS,
     click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
@@ -61,14 +67,6 @@ def command(
     Without options: the whole of benchmarks.yaml. Options select from this file or replace its choices. Finished cells
     in the result folder are reused.
     """
-    from tactbench.core.cli.listing import remark_failed
-    from tactbench.core.leaderboard.formats import write_tables
-    from tactbench.core.leaderboard.table import over_all
-    from tactbench.core.leaderboard.view import DEFAULT_VIEW
-    from tactbench.core.plugins.registry import installed
-    from tactbench.core.study.results import table_of
-    from tactbench.core.study.study import Study, carry_out
-
     remark_failed(installed())
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **options_given))
     table = table_of(store, over_all(store, outcome.rows))

@@ -7,8 +7,15 @@ from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import print_tables
 from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, format_option, options
+from tactbench.core.leaderboard.sensitivity import sensitivity_tables
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.bounds import MOST_REPEATS
+from tactbench.core.study.sensitivity import carry_out_sensitivity
+from tactbench.core.study.study import Study
+from tactbench.core.tables.terminal import remark
 
 
 @click.command(name="sensitivity")
@@ -35,14 +42,6 @@ def command(
     Every nuisance is set to both ends of its range, and the most influential nuisances in pairs, on the same seeds.
     Finished cells are reused; each combination of ends has its own folder in OUT/assumptions.
     """
-    from tactbench.core.cli.grid import print_tables
-    from tactbench.core.leaderboard.sensitivity import sensitivity_tables
-    from tactbench.core.matrix.store import Store
-    from tactbench.core.plugins.registry import installed
-    from tactbench.core.study.sensitivity import carry_out_sensitivity
-    from tactbench.core.study.study import Study
-    from tactbench.core.tables.terminal import remark
-
     study = Study(out=out, estimator=estimator or None, set=settings, **options_given)
     stopped = carry_out_sensitivity(study, nuisances)
     specs = {sensor.name: sensor.spec for sensor in installed().sensors}

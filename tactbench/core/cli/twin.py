@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import print_records
 from tactbench.core.cli.options import EFFECTS, format_option
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Row
-    from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
+from tactbench.core.cost.knobs import task_score
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard.names import grouped
+from tactbench.core.matrix.store import Row
+from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.plugins.rigs import rig_context
+from tactbench.core.study.progress import progress
+from tactbench.core.study.simulation import simulation_of
+from tactbench.core.tables.terminal import remark
 
 _SCORES = ("effects", "estimator", "metric", "unit", "score", "sim_s", "reason")
 _EFFECTS = ("included", "effect", "cost_ms", "change", "unit", "reason")
@@ -25,7 +32,7 @@ def command() -> None:
 @command.command(name="explain")
 @click.option("--sensor", "sensor_name", required=True, metavar="NAME", help="Sensor.")
 @click.option("--task", "task_name", required=True, metavar="NAME", help="Task whose scenes are planned.")
-@click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
+@click.option("--rounds", type=click.IntRange(min=0), default=5, metavar="N",
               help="Number of recordings to time each effect with; 0: the plan alone, no times and score.")  # fmt: skip
 @EFFECTS
 @format_option("table", "json", "csv")
@@ -34,16 +41,6 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
     The last table has the task's score with the effects chosen and with all of them.
     """
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.cost.knobs import task_score
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.names import grouped
-    from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.plugins.rigs import rig_context
-    from tactbench.core.study.progress import progress
-    from tactbench.core.study.simulation import simulation_of
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     rig_name = registry.first_rig("simulated")
     simulation = simulation_of(registry, rig_name, [sensor_name], effects)
@@ -89,11 +86,8 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
 
 def _effect(row: Explained) -> dict[str, Any]:
-    entry, cost_ms = row.entry, None if row.cost_s is None else round(1e3 * row.cost_s, 2)
-    return {
-        "effect": entry.effect, "included": entry.included, "asked": entry.asked, "reason": entry.reason,
-        "change": entry.change, "unit": entry.unit, "cost_ms": cost_ms, "remark": row.remark,
-    }  # fmt: skip
+    cost_ms = None if row.cost_s is None else round(1e3 * row.cost_s, 2)
+    return {**row.entry.model_dump(), "cost_ms": cost_ms, "remark": row.remark}
 
 
 @command.command(name="verify")
@@ -104,11 +98,6 @@ def verify(ctx: click.Context, shape: str) -> None:
 
     Exit code 1 if a comparison is outside its bound.
     """
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.tables.terminal import remark
-
     registry = load_registry()
     rig = registry.first_rig("simulated")
     where = registry.rigs[rig].verification
@@ -123,6 +112,5 @@ def verify(ctx: click.Context, shape: str) -> None:
 
 
 def _record(verdict: Verdict) -> dict[str, Any]:
-    numbers = {name: float(getattr(verdict, name)) for name in ("found", "expected", "bound")}
-    finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
-    return {"met": verdict.met, "what": verdict.name, **finite, "unit": verdict.unit, "source": verdict.source}
+    stated = asdict(verdict)
+    return {"met": verdict.met, "what": stated.pop("name"), **stated}

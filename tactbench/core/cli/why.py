@@ -6,15 +6,18 @@ import sys
 from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from tactbench.core.cli.grid import field_text, print_fields, print_tables
 from tactbench.core.cli.options import RESULTS, format_option
+from tactbench.core.matrix.why import StoredCell, stored_cell
+from tactbench.core.report.cells import details, recording_scores
+from tactbench.core.statistics.replicates import over_replicates
+from tactbench.core.study.progress import progress
+from tactbench.core.study.results import opened
 from tactbench.core.tables.text import command_line, cut, json_text, visible_lines
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.why import StoredCell
 
 _LINES = 15
 """Largest number of lines of a traceback, log or table that are printed; JSON output has all lines."""
@@ -35,9 +38,6 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
     replicates. With --again, simulated recordings are made anew in a temporary folder, and the exit code is 1 if a
     result differs or the cell fails.
     """
-    from tactbench.core.matrix.why import stored_cell
-    from tactbench.core.study.results import opened
-
     found = stored_cell(opened(out), cell)
     facts = _again(found) if again else _facts(found)
     if shape == "json":
@@ -49,10 +49,8 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
 
 def _facts(found: StoredCell) -> dict[str, Any]:
     """Return the row of the first replicate, with the reasons, if any, why a run would not reuse the result."""
-    from tactbench.core.report.cells import recording_scores
-
     row = found.row
-    _, reasons = found.changes()
+    reasons = found.changes()
     done = row["status"] == "done"
     return {
         **row, "cell": found.cell.name, "answer": "hit" if done and not reasons else "miss", "reasons": reasons,
@@ -64,10 +62,6 @@ def _facts(found: StoredCell) -> dict[str, Any]:
 
 def _print(facts: dict[str, Any], found: StoredCell) -> None:
     """Print the facts, and the details of the cell over all replicates, as in the report."""
-    from tactbench.core.cli.grid import print_fields, print_tables
-    from tactbench.core.report.cells import details
-    from tactbench.core.statistics.replicates import over_replicates
-
     name = found.cell.name.removesuffix(f"/{found.cell.seed}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     known = details(row, found.store.answers(str(row["key"])).get("test"))
@@ -87,8 +81,6 @@ def _print(facts: dict[str, Any], found: StoredCell) -> None:
 
 def _again(found: StoredCell) -> dict[str, Any]:
     """Compute the cell again in this process, and return its differences from the stored result."""
-    from tactbench.core.study.progress import progress
-
     with redirect_stdout(sys.stderr), progress() as display:  # what a plugin prints is no result
         row, differences, recorded = found.again(display)
     return {
@@ -97,12 +89,11 @@ def _again(found: StoredCell) -> dict[str, Any]:
         "recordings_made": recorded,
         **{name: row[name] for name in ("status", "reason", "traceback", "score")},
         "differences": differences,
-        "circumstances": found.changes()[1],
+        "circumstances": found.changes(),
     }
 
 
 def _print_again(facts: dict[str, Any], _: StoredCell) -> None:
-    from tactbench.core.cli.grid import field_text, print_fields
 
     texts = {**facts, "traceback": ""}
     print_fields([(name.replace("_", " "), text) for name, one in texts.items() if (text := field_text(one))])

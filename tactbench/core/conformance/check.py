@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NoReturn, get_args
@@ -23,16 +23,12 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
-from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, line_in, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
 EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
 KINDS = EVERY_KIND[:-1]
 """Kinds of descriptors that can be checked, and `dataset` for a mapping file."""
-Mode = Literal["passive", "invasive", "recording"]
-"""Modes of checks. `passive`: no device is opened and nothing moves. `invasive`: a device is opened, or a rig presses.
-`recording`: only a recording is read."""
 HEAVY = frozenset({
     "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
@@ -90,11 +86,7 @@ class Subject:
     distribution: str
     registry: Registry
     recording: Path | None = None
-    """Recording to be read in the mode `recording`."""
-    rig_file: Path | None = None
-    """Rig file of the devices to be opened in the mode `invasive`."""
-    operator: Operator | None = None
-    """The person who operates the rig in the mode `invasive`."""
+    """Recording of the sensor to be read."""
     root: Path | None = None
     """Folder that contains the files of a data set."""
 
@@ -129,7 +121,6 @@ class Check:
     name: str
     """Name of the check in lower case with hyphens; unique among the checks of a kind."""
     kinds: tuple[Kind, ...]
-    mode: Mode
     why: str
     """The mistake that the check finds, in one sentence."""
     cure: str
@@ -144,14 +135,14 @@ CHECKS: list[Check] = []
 """All checks in the order in which they run, each check after those that it needs."""
 
 
-def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Callable[[Subject], None]], Check]:
+def check(*kinds: Kind, needs: str = "") -> Callable[[Callable[[Subject], None]], Check]:
     """Make a check from a function and its name; its docstring is `why` and, as a second paragraph, `cure`."""
 
     def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         why, cure = (" ".join(text.split()) for text in (why, cure))
         name, needed = run.__name__.replace("_", "-"), tuple(needs.split())
-        CHECKS.append(Check(name, kinds, mode, why, cure, needed, run))
+        CHECKS.append(Check(name, kinds, why, cure, needed, run))
         return CHECKS[-1]
 
     return made
@@ -231,7 +222,7 @@ def import_is_light(subject: Subject) -> None:
         fail(subject.module, f"importing this module also imports {', '.join(heavy)}")
 
 
-@lru_cache(maxsize=64)
+@cache
 def _imported_with(module: str) -> list[str]:
     """Return the modules that importing `module` loads in a new interpreter, without those of tactbench's own."""
     path = os.pathsep.join(part for part in sys.path if part)

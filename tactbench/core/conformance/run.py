@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -24,7 +23,6 @@ from tactbench.core.conformance.check import (
     CheckOutcome,
     CheckSkipped,
     Kind,
-    Mode,
     Subject,
     code_of,
     skip,
@@ -43,9 +41,9 @@ TIMEOUT_S = 60.0
 """Time limit of one check [s]; the slowest in tactbench, on the largest skin, takes 2 s on an idle core."""
 
 
-def checks_of(kind: Kind, *modes: Mode) -> tuple[Check, ...]:
-    """Return the checks of a kind of plugin in the given modes, in their order."""
-    return tuple(one for one in CHECKS if kind in one.kinds and one.mode in modes)
+def checks_of(kind: Kind) -> tuple[Check, ...]:
+    """Return the checks of a kind of plugin in their order."""
+    return tuple(one for one in CHECKS if kind in one.kinds)
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,6 @@ class CheckReport:
 
     kind: Kind
     name: str
-    modes: tuple[Mode, ...]
     outcomes: tuple[CheckOutcome, ...] = field(repr=False)
 
     def of(self, status: str) -> tuple[CheckOutcome, ...]:
@@ -73,9 +70,9 @@ class CheckReport:
 
     @property
     def level(self) -> str | None:
-        """Level reached by the passed checks; None if a check failed, or only a recording was read."""
+        """Level reached by the passed checks; None if a check failed."""
         passed = {one.check for one in self.of("passed")}
-        if "passive" not in self.modes or self.failed or not passed:
+        if self.failed or not passed:
             return None
         if "recording-is-of-a-real-unit" in passed:
             return "gold"
@@ -125,32 +122,22 @@ def plugins_named(registry: Registry, name: str) -> list[PluginRow]:
     ]
 
 
-def run_checks(
-    subject: Subject,
-    *,
-    modes: Sequence[Mode] = ("passive",),
-    isolated: bool = True,
-    without: Collection[str] = (),
-    **fields: Any,
-) -> CheckReport:
+def run_checks(subject: Subject, *, isolated: bool = True, without: Collection[str] = (), **fields: Any) -> CheckReport:
     """Run the checks of one plugin, each within a time limit.
 
     Parameters
     ----------
-    modes
-        Modes of the checks. In the mode `recording`, the plugin's code is not imported.
     isolated
-        True: run in a child process. Checks of the mode `invasive` always run in this process, without a time limit:
-        an interrupt must reach the rig.
+        True: run in a child process.
     without
         Names of checks to leave out.
     fields
-        Values of the subject's fields `recording`, `rig_file`, `operator` and `root`.
+        Values of the subject's fields `recording` and `root`.
     """
     subject = replace(subject, **fields)
-    checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
+    checks = [one for one in checks_of(subject.kind) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
-    while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
+    while waiting := [one.name for one in checks if one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(partial(_tried, subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; the remaining checks run in another process
@@ -159,10 +146,7 @@ def run_checks(
                 outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
-    for one in checks:
-        if one.mode == "invasive":
-            outcomes[one.name] = _tried(subject, outcomes, one.name)
-    return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
+    return CheckReport(subject.kind, subject.name, tuple(outcomes[one.name] for one in checks))
 
 
 def _tried(subject: Subject, outcomes: dict[str, CheckOutcome], name: str) -> CheckOutcome:
@@ -173,7 +157,7 @@ def _tried(subject: Subject, outcomes: dict[str, CheckOutcome], name: str) -> Ch
         for before in filter(None, map(outcomes.get, one.needs)):
             if before.status != "passed":
                 skip(before.text if before.status == "skipped" else f"not tried, as {before.check} has not passed")
-        with unchanged(subject) if one.mode == "passive" else nullcontext(), code_of(subject.module, subject):
+        with unchanged(subject), code_of(subject.module, subject):
             one.run(subject)
     except CheckFailed as failure:
         advice = "" if failure.__cause__ is not None else one.cure

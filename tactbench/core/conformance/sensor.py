@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import fields
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ Place = tuple[float, float]
 GENTLE_N, FIRM_N, OVERLOAD_N = 1.0, 2.0, 100.0  # the last is beyond what any fingertip is pressed with on purpose
 SHEAR = 0.3  # tangential over normal force of a press that is dragged: skin sticks to most surfaces up to it
 MOST_PRESSED = 6  # places, drawn from the sensor's list: a wrong axis shows at each of them
-REST_SHARE, REST_COUNTS = 0.01, 1.0  # tolerance of the rest, of the range and in the channel's unit
+REST_SHARE, REST_COUNTS = 0.01, 1.0  # tolerance of the rest, of the range, or without one in the channel's unit
 STAYS = 0.02  # smallest motion of the response over that of the press: swapped axes leave a thousandth
 SHARES = (0.1, 1.5)  # of a load, that channels in newton sum to: taxels leave gaps, and some overlap (assumed)
 PATCH_MM, PATCH_CELLS = 1.25, 1.5  # deviation of a local press: half a fingertip's contact, and so many cells at least
@@ -183,7 +183,7 @@ def patch_mm(grid: SkinGrid) -> float:
     return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
 
 
-@lru_cache(maxsize=4)
+@cache
 def _prepared(subject: Subject, names: tuple[str, ...]) -> Any:
     with code_of("transducer", subject):
         return subject.code("transducer")(subject.spec, skin_grid(subject.spec.skin.sheet), list(names))
@@ -233,7 +233,7 @@ def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged
     )  # fmt: skip
 
 
-@lru_cache(maxsize=2)
+@cache
 def _sites(subject: Subject) -> dict[Place, list[int]]:
     """Return the columns of the taxels, grouped by place on the sheet [mm]."""
     sites: dict[Place, list[int]] = {}
@@ -251,7 +251,7 @@ def _places(subject: Subject) -> list[Place]:
     return [sites[one] for one in drawn] or [middle]
 
 
-@lru_cache(maxsize=4)
+@cache
 def _changes(subject: Subject, force_n: float = GENTLE_N) -> FloatArray:
     """Return the (places, channels) changes of the readings from rest under a press at each place."""
     rest = _read(subject, _state(subject, 0.0))
@@ -292,8 +292,7 @@ def rest_is_as_stated(subject: Subject) -> None:
     for channel, found in zip(observed(subject), _read(subject, _state(subject, 0.0)), strict=True):
         rest = found if channel.rest is None else channel.rest.to(channel.unit)
         low, high = limits_of(channel)
-        span = high - low if math.isfinite(high - low) else 0.0
-        if abs(found - rest) > max(REST_SHARE * span, REST_COUNTS):
+        if abs(found - rest) > (REST_SHARE * (high - low) if math.isfinite(high - low) else REST_COUNTS):
             fail(f"channel {channel.name}: rest", f"{rest:g} {channel.unit} is stated, the transducer gives {found:g}")
 
 

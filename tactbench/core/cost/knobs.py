@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -52,18 +53,6 @@ class Setting(NamedTuple):
     split: str | None = None
     simulation: Simulation = Simulation()
 
-    @property
-    def choice(self) -> TaskChoice:
-        """Task choice with this setting; the name of the task is filled in by the caller."""
-        own = () if self.split is None else (self.split,)
-        return TaskChoice(name="", protocol=(self.protocol,), split=own, estimators=(self.estimator,))
-
-    def is_of(self, row: Row) -> bool:
-        """Return True if a result row is of this setting, given that it is of the same simulation."""
-        way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
-        wanted = (way, self.estimator.name, dict(self.estimator.params))
-        return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
-
 
 def quick_estimator(registry: Registry, task: str) -> str:
     """Return the name of a linear estimator for `task` without parameter search, preferably one of the task's own.
@@ -97,19 +86,18 @@ def task_score(registry: Registry, rig: str, sensor: str, task: str, simulation:
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
     """Yield the settings varied for the first of `estimators`, and each of `estimators` with its defaults."""
-    first = estimators[0]
-    plain = EstimatorChoice(name=first.name)
+    first, plain = estimators[0], EstimatorChoice(name=estimators[0].name)
     own = first.params.get("n_estimators")
     for trees in sorted({*TREES, own}) if isinstance(own, int) else ():
-        changed = plain if trees == own else EstimatorChoice(name=first.name, params={"n_estimators": trees})
-        yield Setting("trees", str(trees), protocol, changed)
+        changed = EstimatorChoice(name=first.name, params={"n_estimators": trees})
+        yield Setting("trees", str(trees), protocol, plain if trees == own else changed)
     if task.answer_per != "frame" and not task.summaries:
         for k in WINDOWS:
-            same = first.window_grid == (k,)
-            yield Setting("window k", str(k), protocol if same else f"{protocol}@k={k}", plain)
+            yield Setting("window k", str(k), protocol if first.window_grid == (k,) else f"{protocol}@k={k}", plain)
         for every in EVERY:
-            name = protocol if every == 1 else f"{protocol}@every={every}"
-            yield Setting("every n-th sample", str(every), name, plain)
+            yield Setting(
+                "every n-th sample", str(every), f"{protocol}@every={every}" if every > 1 else protocol, plain
+            )
     for split in task.splits:
         if shots(split) and DEPLOYABLE.name in task.protocols:
             yield Setting("training sessions", str(shots(split)), DEPLOYABLE.name, plain, split)
@@ -147,35 +135,34 @@ def measure(
         record for each setting, in the order of `settings`.
     """
     task = matrix.tasks[0].name
-    answers: dict[Simulation, list[Row]] = {}
-    for simulation in dict.fromkeys(one.simulation for one in settings):
-        own = [one for one in settings if one.simulation == simulation]
-        tasks = tuple(one.choice.model_copy(update={"name": task}) for one in own)
-        store = Store(folder if simulation == Simulation() else folder / f"{own[0].knob}-{own[0].value}")
-        part = matrix.model_copy(update={"simulation": simulation, "tasks": tasks})
+    records: list[Record] = []
+    rows: list[Row] = []
+    for one in settings:
+        split = (one.split,) if one.split else ()
+        tasks = (TaskChoice(name=task, protocol=(one.protocol,), split=split, estimators=(one.estimator,)),)
+        store = Store(folder if one.simulation == Simulation() else folder / f"{one.knob}-{one.value}")
+        part = matrix.model_copy(update={"simulation": one.simulation, "tasks": tasks})
         outcome = run_matrix(part, store, choice=choice, recordings=recordings, progress=progress)
-        answers[simulation] = over_replicates(outcome.rows)
-    records: list[Record] = [
-        {"knob": one.knob, "value": one.value, **{key: row[key] for key in _KEPT}, "front": False}
-        for one in settings
-        for row in answers[one.simulation]
-        if one.is_of(row)
-    ]
-    rows = [row for own in answers.values() for row in own]
+        own = over_replicates(outcome.rows)
+        wanted = one.estimator.name, dict(one.estimator.params)
+        row = next(row for row in own if (row["estimator"], row["params"]) == wanted)
+        records.append({"knob": one.knob, "value": one.value, **{key: row[key] for key in _KEPT}, "front": False})
+        rows += own
     first = next((row for row in rows if row["status"] == "done"), rows[0])
     sign = 1.0 if lower_is_better(first["metric"]) else -1.0
-    trivial: list[float] = [
-        row["score"] for row in rows
-        if (row["is_baseline"], row["protocol"], row["split"]) == (True, first["protocol"], first["split"])
-        and row["looks_at"] == "nothing" and row["status"] == "done"
+    trivial = [
+        sign * row["score"] for row in rows
+        if (row["looks_at"], row["status"]) == ("nothing", "done")
+        and (row["protocol"], row["split"]) == (first["protocol"], first["split"])
     ]  # fmt: skip
-    bar = min(trivial, key=lambda score: sign * score, default=None)
+    bar = min(trivial, default=math.inf)
     competing = [
         one for one in records
         if one["knob"] in BOUGHT and one["status"] == "done" and one["answer_delay_ms"] is not None
-        and (bar is None or sign * one["score"] < sign * bar)
+        and sign * one["score"] < bar
     ]  # fmt: skip
     for best in front(competing, lambda one: (one["answer_delay_ms"], sign * one["score"])):
         best["front"] = True
     about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
-    return {**about, "seed": matrix.seed, "trivial": bar, "replicates": matrix.repeats, "settings": records}
+    shown = sign * bar if trivial else None
+    return {**about, "seed": matrix.seed, "trivial": shown, "replicates": matrix.repeats, "settings": records}

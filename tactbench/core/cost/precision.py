@@ -34,8 +34,6 @@ class Skipped(NamedTuple):
 
     subject: str
     label: str
-    rung: str
-    """Name of the solver (rung); empty: none."""
     reason: str
 
 
@@ -47,7 +45,7 @@ def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[Cos
         try:
             yield from job.run()
         except TactbenchError as error:
-            yield Skipped(subject, job.label, job.rung, str(error))
+            yield Skipped(subject, job.label, str(error))
         progress.advance(job.label)
 
 

@@ -25,7 +25,7 @@ class Column(NamedTuple):
     """Name of the column for programs: a key of ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
     text: Callable[[Row], str]
     value: Callable[[Row], float | None] | None = None
-    """Number by which the column is sorted: times in s, intervals by their middle; None for a column of words."""
+    """Number by which the column is sorted: times in s, intervals by their lower end; None for a column of words."""
 
 
 def _score(shown: str, key: str) -> Column:
@@ -33,11 +33,7 @@ def _score(shown: str, key: str) -> Column:
 
 
 def _interval(shown: str, low: str, high: str) -> Column:
-    def middle(row: Row) -> float | None:
-        ends = [end for end in (row.get(low), row.get(high)) if end is not None]
-        return sum(ends) / len(ends) if ends else None
-
-    return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), middle)
+    return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), lambda row: row.get(low))
 
 
 def _time(shown: str, key: str) -> Column:

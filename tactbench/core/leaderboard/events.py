@@ -7,18 +7,15 @@ from collections.abc import Sequence
 from tactbench.core.leaderboard.names import Row, answer_name
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text_table import TextTable, text_table
 
 _FIGURES = {
-    "precision": ("precision", ".2f"),
-    "recall": ("recall", ".2f"),
-    "misses": ("misses", "g"),
-    "latency p50 [ms]": ("onset latency p50 ms", ".0f"),
-    "p95 [ms]": ("onset latency p95 ms", ".0f"),
-    "false alarms/min": ("false alarms per minute", ".2g"),
-    "compute [s/s]": ("compute s per s of signal", ".2g"),
-}
-"""Key of the figure of merit, and number format, of each column."""
+    "precision": "precision", "recall": "recall", "misses": "misses", "events": "events",
+    "latency p50 [ms]": "onset latency p50 ms", "p95 [ms]": "onset latency p95 ms",
+    "false alarms/min": "false alarms per minute",
+    "compute [s/s]": "compute s per s of signal",
+}  # fmt: skip
+"""Key of the figure of merit of each column."""
 _NOTE = (
     "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
     "Compute: computing time per second of signal."
@@ -33,10 +30,8 @@ def events_table(rows: Sequence[Row]) -> TextTable | None:
     lines = []
     for row in finished:
         figures = row["events"]
-        texts = {name: ABSENT if figures.get(key) is None else f"{figures[key]:{form}}"
-                 for name, (key, form) in _FIGURES.items()}  # fmt: skip
-        if "misses" in figures:
-            texts["misses"] += f" of {figures['events']:g}"
+        values = {name: figures.get(key) for name, key in _FIGURES.items()}
+        texts = {name: ABSENT if value is None else f"{value:.3g}" for name, value in values.items()}
         if figures.get("alarms") == 0:
             texts["latency p50 [ms]"] = "never alarms"
         lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
@@ -44,13 +39,9 @@ def events_table(rows: Sequence[Row]) -> TextTable | None:
         " or ".join(dict.fromkeys(f"{row['events'][key]:g}" for row in finished if key in row["events"]))
         for key in ("bound of false alarms per minute", "area up to false alarms per minute")
     )
-    limit = f" for at most {bound} false alarm{'s' * (bound != '1')} a minute" if bound else ""
-    notes = (f"Recall area: recall, averaged over false alarms a minute from 0 to {area}. {_NOTE}" if area else _NOTE,)
-    return TextTable(
-        f"Events, at the threshold that validation recordings chose{limit}",
-        ("task", "sensor", "estimator", *_FIGURES),
-        tuple(lines),
-        frozenset(_FIGURES),
-        kinds=tuple("baseline" if row["is_baseline"] else "result" for row in finished),
-        notes=notes,
-    )
+    limit = f" for at most {bound} false alarms a minute" if bound else ""
+    notes = (f"Recall area: recall, averaged over false alarms a minute from 0 to {area}. " * bool(area) + _NOTE,)
+    kinds = ["baseline" if row["is_baseline"] else "result" for row in finished]
+    title = f"Events, at the threshold that validation recordings chose{limit}"
+    columns = ("task", "sensor", "estimator", *_FIGURES)
+    return text_table(title, columns, lines, numeric=_FIGURES, kinds=kinds, notes=notes)

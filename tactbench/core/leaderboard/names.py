@@ -112,11 +112,6 @@ class Bars:
         trivial = self.trivial(row)
         return row.get("baseline") if trivial is None else trivial["score"]
 
-    def name(self, row: Row) -> str:
-        """Return the name of the trivial answer to compare `row` with."""
-        trivial = self.trivial(row)
-        return "the trivial answer" if trivial is None else answer_name(trivial)
-
     def no_better(self, row: Row) -> bool:
         """Return True if an answer is no better than the trivial answer."""
         return self._reaches(row, error_of(row))

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from tactbench.core.leaderboard.columns import Line
 from tactbench.core.leaderboard.names import Bars, Row, sensor_name
-from tactbench.core.leaderboard.sentences import Note
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
@@ -69,9 +68,9 @@ def _block(block: Block, required: Requirements, task: TaskSpec, specs: Mapping[
     if required.range_n is not None:
         most_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=0.0)
         if not block.lines[0].row["simulated"]:
-            notes += (Note("The largest force behind these scores is unknown: the rows do not state it."),)
+            notes += ("The largest force behind these scores is unknown: the rows do not state it.",)
         elif required.range_n > most_n:
-            notes += (Note(f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown."),)
+            notes += (f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown.",)
     return replace(block, lines=tuple(line for _, line in found), verdict=verdicts, notes=notes)
 
 

@@ -5,18 +5,17 @@ Each set of ends has its own result folder, such as ``OUT/assumptions/placement_
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise, permutations
+from itertools import pairwise, permutations, product
 from typing import Any
 
 from tactbench.core.leaderboard.names import Row, answer_name, error_of, grouped, hardware_name, metric_name, sign_of
-from tactbench.core.leaderboard.pairwise import folder_comparisons
 from tactbench.core.leaderboard.sentences import ORDER_DEPENDS_ON
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.scene import RANGES
 from tactbench.core.spec.sensor import PhysicalRange, SensorSpec
-from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.paired import Difference, difference
 from tactbench.core.statistics.replicates import counted, over_replicates
 from tactbench.core.tables.numbers import ABSENT, score, signed
 from tactbench.core.tables.text_table import TextTable, text_table
@@ -57,22 +56,27 @@ class Sensitivity:
     """
 
     def __init__(self, rows: Sequence[Row], variants: Mapping[str, Sequence[Row]]) -> None:
-        self.stated = {str(row["sensor"]): row for row in over_replicates(rows)}
+        self.stated = _by_sensor(rows)
         self.task = str(rows[0]["task"])
         self.order = _order(self.stated)
         self.rows: dict[str, dict[str, Row]] = {}
-        self.changes: dict[str, dict[str, Any]] = {}
+        self.changes: dict[str, dict[str, Difference]] = {}
+        """Changes from the scores as stated, by set of ends and sensor, over the seeds that both have."""
         for name, own in variants.items():
             seeds = {(row["sensor"], row["seed"]) for row in own}
-            same = over_replicates([row for row in rows if (row["sensor"], row["seed"]) in seeds])
-            found = over_replicates(own)
-            self.rows[name] = {str(row["sensor"]): row for row in found}
-            self.changes[name] = {pair.row["sensor"]: pair for pair in folder_comparisons(found, same, name, "stated")}
+            same = _by_sensor([row for row in rows if (row["sensor"], row["seed"]) in seeds])
+            self.rows[name] = _by_sensor(own)
+            pairs = {sensor: (row, same[sensor]) for sensor, row in self.rows[name].items() if sensor in same}
+            self.changes[name] = {
+                sensor: difference(*pair)
+                for sensor, pair in pairs.items()
+                if all(one["status"] == "done" for one in pair)
+            }
 
     def change(self, name: str, sensor: str) -> float:
         """Return a sensor's change of score from that as stated; 0 if the sensor lacks the nuisance."""
-        pair = self.changes[name].get(sensor)
-        return 0.0 if pair is None or pair.difference is None else float(pair.difference.value)
+        found = self.changes[name].get(sensor)
+        return 0.0 if found is None else found.value
 
     def gain(self, name: str) -> float:
         """Return the improvement of the score over that as stated, as the mean over the sensors."""
@@ -80,19 +84,21 @@ class Sensitivity:
         return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
 
     def verdict(self, name: str) -> str:
-        """Return a text on the order of the sensors for a set of ends: stays, turns round, or is not shown."""
+        """Return a text on the order of the sensors for a set of ends: it stays, turns round, or is not shown."""
         order = _order({**self.stated, **self.rows[name]})
         if any((worse, better) in order for better, worse in self.order):
             return TURNED
-        if not order or self.order - order:
-            return "not shown"
-        return "stays" if order == self.order else "shown here only"
+        return "stays" if order == self.order else "not shown"
 
     def turned(self) -> list[str]:
         """Return the smallest sets of ends with which the order of the sensors turns round, without their supersets."""
         found = [name for name in self.rows if self.verdict(name) == TURNED]
         within = {name: ends_of(name).items() for name in found}
         return [name for name in found if not any(within[one] < within[name] for one in found)]
+
+
+def _by_sensor(rows: Sequence[Row]) -> dict[str, Row]:
+    return {str(row["sensor"]): row for row in over_replicates(rows)}
 
 
 def _order(rows: Mapping[str, Row]) -> set[tuple[str, str]]:
@@ -111,20 +117,18 @@ def _order_text(rows: Mapping[str, Row]) -> str:
 
 def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
     """Return the sensitivities computed in a folder, by (task, protocol, split, rig, estimator)."""
+    folders = [path.parent for path in sorted((store.folder / FOLDER).glob("*=*/cells"))]
+    variants = {folder.name: _questions(Store(folder)) for folder in folders}
+    stated = _questions(store) if folders else {}
+    own = {key: {name: rows[key] for name, rows in variants.items() if key in rows} for key in stated}
+    return {key: Sensitivity(stated[key], found) for key, found in own.items() if found}
 
-    def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
-        answers = (row for row in rows if not row["is_baseline"])
-        return grouped(answers, lambda row: (row["task"], row["protocol"], row["split"] or "", hardware_name(row),
-                                             answer_name(row)))  # fmt: skip
 
-    folders = sorted((store.folder / FOLDER).glob("*=*/cells"))
-    variants = {path.parent.name: questions(Store(path.parent).rows()) for path in folders}
-    found = {}
-    for key, stated in questions(store.rows() if folders else ()).items():
-        own = {name: rows[key] for name, rows in variants.items() if key in rows}
-        if own:
-            found[key] = Sensitivity(stated, own)
-    return found
+def _questions(store: Store) -> dict[tuple[str, ...], list[Row]]:
+    def question(row: Row) -> tuple[str, ...]:
+        return row["task"], row["protocol"], row["split"] or "", hardware_name(row), answer_name(row)
+
+    return grouped((row for row in store.rows() if not row["is_baseline"]), question)
 
 
 def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:
@@ -142,33 +146,30 @@ def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[Te
 
 
 def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
-    row, sensors = next(iter(found.stated.values())), list(found.stated)
-    names = sorted(found.rows, key=lambda name: (len(ends_of(name)), -max(abs(found.change(name, s)) for s in sensors)))
-    stated = [text for one in found.stated.values() for text in (score(one["score"], one["unit"]), "")]
-    lines = [["as stated", "", "", "", *stated, _order_text(found.stated)]]
+    sensors, row = list(found.stated), next(iter(found.stated.values()))
+    scores = [score(one["score"], one["unit"]) for one in found.stated.values()]
+    lines = [["as stated", "", "", "", *(text for one in scores for text in (one, "")), _order_text(found.stated)]]
     notes = dict.fromkeys([_NOTE])
-    for name in names:
-        ends, own = ends_of(name), found.rows[name]
-        nuisance = next(iter(ends))
+    for name in sorted(
+        found.rows, key=lambda one: (len(ends_of(one)), -max(abs(found.change(one, s)) for s in sensors))
+    ):
+        own, ends = found.rows[name], ends_of(name)
         values = (_alike({s: f"{one['simulation']['nuisances'][end]:g}" for s, one in own.items()}) for end in ends)
+        texts = (text for sensor in sensors for text in _change(own.get(sensor), found.changes[name].get(sensor)))
+        order = f"{_order_text({**found.stated, **own})}: {found.verdict(name)}"
         ranges: dict[str, PhysicalRange] = {}
-        if len(ends) == 1:
-            known = {sensor: ranges_of(specs[sensor]) for sensor in own if sensor in specs}
-            ranges = {sensor: of[nuisance] for sensor, of in known.items() if nuisance in of}
-        for sensor, one in ranges.items():
-            of_sensor = f"{nuisance}, {sensor}" if nuisance not in RANGES else nuisance
-            notes[f"{of_sensor}: {one.source.reference} ({one.source.tag})."] = None
-        lines.append([
-            ", ".join(ends), ", ".join(values),
-            _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in ranges.items()}),
-            _alike({sensor: one.source.tag for sensor, one in ranges.items()}),
-            *(text for sensor in sensors for text in _scores(found, name, sensor)),
-            f"{_order_text({**found.stated, **own})}: {found.verdict(name)}",
-        ])  # fmt: skip
+        for sensor, nuisance in product(own, ends if len(ends) == 1 else ()):
+            if sensor in specs and (one := ranges_of(specs[sensor]).get(nuisance)):
+                ranges[sensor] = one
+                of = f", {sensor}" if nuisance not in RANGES else ""
+                notes[f"{nuisance}{of}: {one.source.reference} ({one.source.tag})."] = None
+        within = _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in ranges.items()})
+        source = _alike({sensor: one.source.tag for sensor, one in ranges.items()})
+        lines.append([", ".join(ends), ", ".join(values), within, source, *texts, order])
     campaigns = counted(row["n_replicates"] or 0, "campaign")
     about = [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
     numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
-    columns = ("nuisance", "value", "range", "source", *numeric, *(["order"] if len(sensors) > 1 else []))
+    columns = ("nuisance", "value", "range", "source", *numeric, *["order"] * (len(sensors) > 1))
     lines = [line[: len(columns)] for line in lines]
     table = text_table(" · ".join(about), columns, lines, numeric=numeric, notes=tuple(notes))
     return replace(table, first_to_go=("source", "range"))
@@ -181,13 +182,10 @@ def _alike(texts: Mapping[str, str]) -> str:
     return ", ".join(f"{sensor} {text}" for sensor, text in texts.items())
 
 
-def _scores(found: Sensitivity, name: str, sensor: str) -> tuple[str, str]:
+def _change(row: Row | None, change: Difference | None) -> tuple[str, str]:
     """Return as text a sensor's score with a set of ends, and its change from the score as stated."""
-    pair = found.changes[name].get(sensor)
-    if pair is None or pair.first_row is None:
-        return ABSENT, ABSENT
-    if pair.difference is None:
-        return ABSENT, pair.refused
-    unit, apart = pair.row["unit"], pair.difference
-    ends = " … ".join(signed(end, unit) for end in (apart.low, apart.high) if end is not None)
-    return score(pair.first_row["score"], unit), signed(apart.value, unit) + (f" ({ends})" if ends else "")
+    if row is None or change is None:
+        return ABSENT, ABSENT if row is None else row["status"]
+    unit = row["unit"]
+    ends = " … ".join(signed(end, unit) for end in (change.low, change.high) if end is not None)
+    return score(row["score"], unit), signed(change.value, unit) + (f" ({ends})" if ends else "")

@@ -5,13 +5,12 @@ docs/tables.md has the list. At most two sentences are above and five notes belo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import NamedTuple
 
 from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, metric_name, sign_of
-from tactbench.core.spec.row import LEAKS, STOPPED, plural
+from tactbench.core.spec.row import STOPPED, plural
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, against_reference, count_range, least_coverage, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
@@ -25,14 +24,6 @@ LONGEST = 300
 ORDER_DEPENDS_ON = "order_depends_on"
 """Key of a row with the nuisances at whose ends the order of the sensors turns round, if computed."""
 NO_BETTER, UNSHOWN, STAMPED, FOUND, SHARED = "–", "*", "‡", "!", "="
-
-
-class Note(NamedTuple):
-    """A note below a table."""
-
-    text: str
-    printed: bool = False
-    """True if the note is printed below a table in a paper too, since it explains a mark or the scores."""
 
 
 @dataclass(frozen=True)
@@ -78,19 +69,14 @@ class Board:
 
     def bars_of(self, rows: Sequence[Row]) -> str:
         """Return as text the trivial answers to compare `rows` with, and their scores."""
-        several = len({row["sensor"] for row in self.answers}) > 1
-        texts = (
-            f"{row['sensor']}/" * several
-            + f"{self.bars.name(row)} {score_with_unit(self.bars.score(row), row['unit'])}"
-            for row in rows
-        )
-        return _some(list(dict.fromkeys(texts)))
+        bars = ((self.bars.trivial(row), score_with_unit(self.bars.score(row), row["unit"])) for row in rows)
+        return _some(f"{'the trivial answer' if bar is None else self.name(bar)} {score}" for bar, score in bars)
 
 
-def _some(names: Sequence[str]) -> str:
-    """Return a text of at most `MOST_NAMES` names, and the number of further names."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+def _some(names: Iterable[str]) -> str:
+    """Return a text of at most `MOST_NAMES` names, each once, and the number of further names."""
+    each = list(dict.fromkeys(names))
+    return ", ".join(each[:MOST_NAMES]) + f" and {len(each) - MOST_NAMES} more" * (len(each) > MOST_NAMES)
 
 
 def above(board: Board) -> tuple[str, ...]:
@@ -100,32 +86,24 @@ def above(board: Board) -> tuple[str, ...]:
 
 def _outcome(board: Board) -> str:
     """Return a sentence on the best answer, or on the reason why no answer is shown to be best."""
+    better = "better than the trivial answer of its own sensor"
     if not board.placed:
-        count, bars = len(board.unplaced), board.bars_of(board.unplaced)
-        of = "The only answer" if count == 1 else f"None of {count} answers"
-        scores = "scores no better" if count == 1 else "scores better"
-        return f"{of} {scores} than the trivial one of its own sensor ({bars})." if count else ""
+        return f"No answer is {better} ({board.bars_of(board.unplaced)})." if board.unplaced else ""
     first, *others = board.placed
     name = board.name(first)
-    where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
     quality = "the smallest error beyond the floor" if board.by_floor else "the best score"
     if not board.ranks:
         return f"{_too_few(board.placed)}; {name} has {quality}."
+    where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
     if board.bars.unshown(first):
-        return (
-            f"{where}{name} has {quality}, and is not shown to be better than the trivial "
-            f"{board.bars.name(first)} of its own sensor."
-        )
+        return f"{where}{name} has {quality}, and is not shown to be {better} ({board.bars_of([first])})."
     if not others:
-        if board.bars.score(first) is None:
-            return ""
-        only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
-        return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
+        return f"{where}{name} alone is {better}." if board.bars.score(first) is not None else ""
     # Answers of the same place differ from it in single pairs at most, and of many pairs some differ by chance.
     place = board.ranks[first["cell"]].place
     alike = [row for row in others if (rank := board.ranks[row["cell"]]).place == place or not rank.behind]
     if alike:
-        return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be distinguished from it."
+        return f"{where}{name} has {quality}; {_some(map(board.name, alike))} cannot be distinguished from it."
     return f"{where}{name} is best; {_closest(board, first, others)}."
 
 
@@ -145,23 +123,20 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
 
     unit, sign = first["unit"], -sign_of(first)
     found, second = min(((difference(first, row), row) for row in others), key=lambda pair: sign * pair[0].value)
-    ends = [sign * end for end in (found.low, found.high) if end is not None]
+    low, high = sorted(sign * (end or 0.0) for end in (found.low, found.high))
     closest = f"closest is {board.name(second)}"
-    if len(ends) < 2 or min(ends) <= 0:  # apart by what places go by, and not by this difference
+    if low <= 0:  # apart by what places go by, and not by this difference
         return closest
     by = score_with_unit(sign * found.value, unit)
-    return f"{closest}, worse by {by} ({percent(None, None)} {interval(min(ends), max(ends), unit)})"
+    return f"{closest}, worse by {by} ({percent(None, None)} {interval(low, high, unit)})"
 
 
 def _timed(board: Board) -> str:
     """Return a sentence on trivial answers that use the time alone, if an answer is not shown to be better."""
     held = [row for row in board.answers if board.bars.no_better(row) or board.bars.unshown(row)]
     bars = [trivial for row in held if (trivial := board.bars.trivial(row)) is not None]
-    timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
-    if not timed:
-        return ""
-    reads = "reads" if len(timed) == 1 else "read"
-    return f"{' and '.join(timed)} {reads} no sensor, only the time: such a score needs no touch."
+    timed = _some(answer_name(bar) for bar in bars if bar.get("looks_at") == "time")
+    return f"{timed} reads no sensor, only the time: such a score needs no touch." if timed else ""
 
 
 def _dependence(board: Board) -> str:
@@ -170,76 +145,68 @@ def _dependence(board: Board) -> str:
     return f"The order of the sensors depends on {' and '.join(named)} (`tactbench sensitivity`)." if named else ""
 
 
-def below(board: Board) -> tuple[Note, ...]:
+def below(board: Board) -> tuple[str, ...]:
     """Return at most five notes below a table."""
     notes = [*_marks(board), *_ended(board, failed=True), *_protocol(board), *_floors(board), *_compared(board),
              *_how(board), *_hosts(board), *_ended(board, failed=False)]  # fmt: skip
-    return tuple(note._replace(text=cut(note.text, LONGEST)) for note in notes)[:MOST_BELOW]
+    return tuple(cut(note, LONGEST) for note in notes)[:MOST_BELOW]
 
 
-def _ended(board: Board, *, failed: bool) -> Iterator[Note]:
+def _ended(board: Board, *, failed: bool) -> Iterator[str]:
     """Yield a note on the cells that failed, or on those that were skipped, with the reason."""
     rows = [row for row in board.stopped if (row["status"] in STOPPED) is failed]
-    if not rows:
-        return
     alike = [row for row in rows if (row["status"], row["reason"]) == (rows[0]["status"], rows[0]["reason"])]
-    names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in alike))
-    others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
-    yield Note(f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}.")
+    if alike:
+        names = _some(f"{row['sensor']}/{answer_name(row)}" for row in alike)
+        others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
+        yield f"{names} {alike[0]['status']}{others}: {alike[0]['reason']}"
 
 
-def _marks(board: Board) -> Iterator[Note]:
+def _marks(board: Board) -> Iterator[str]:
     """Yield one note for each mark in the table, at most five notes."""
     finished = board.finished
     for mark, key in ((STAMPED, "stamps"), (FOUND, "findings")):
         texts = grouped([(str(text), row) for row in finished for text in row.get(key) or ()], itemgetter(0))
-        if not texts:
-            continue
-        lead = LEAKS if all(text.startswith(LEAKS) for text in texts) else ""
-        texts_of = "; ".join(
-            f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished))
-            + text.removeprefix(lead).rstrip(".")
+        notes = [
+            f"{_some(board.name(row) for _, row in of)}: " * (len(of) < len(finished)) + text.rstrip(".")
             for text, of in texts.items()
-        )
-        yield Note(f"{mark}  {lead}{texts_of}{'' if texts_of.endswith('?') else '.'}", printed=True)
+        ]
+        if notes:
+            yield f"{mark}  {'; '.join(notes)}"
     if any(rank.unsure for rank in board.ranks.values()):
-        yield Note(f"{SHARED}  each of these rows cannot be distinguished from at least one other")
-    of_own = "better than the trivial answer of its own sensor"
-    if board.unplaced and board.placed:
-        yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
-    unshown = [row for row in board.placed if UNSHOWN in board.marks(row)]
-    if unshown:
-        yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
+        yield f"{SHARED}  each of these rows cannot be distinguished from at least one other"
+    marked = {f"{NO_BETTER}  no": board.unplaced if board.placed else (),
+              f"{UNSHOWN}  not shown to be": [row for row in board.placed if UNSHOWN in board.marks(row)]}  # fmt: skip
+    for mark, rows in marked.items():
+        if rows:
+            yield f"{mark} better than the trivial answer of its own sensor ({board.bars_of(rows)})"
 
 
-def _protocol(board: Board) -> Iterator[Note]:
+def _protocol(board: Board) -> Iterator[str]:
     """Yield a note on a protocol that uses statistics of the test set."""
-    protocol = next((row["protocol"] for row in board.finished if row["dagger"]), None)
-    if protocol is not None:
-        yield Note(f"Protocol {protocol} uses means and deviations of the test set, unknown in use.", printed=True)
+    for protocol in {row["protocol"] for row in board.finished if row["dagger"]}:
+        yield f"Protocol {protocol} uses means and deviations of the test set, unknown in use."
 
 
-def _floors(board: Board) -> Iterator[Note]:
+def _floors(board: Board) -> Iterator[str]:
     """Yield notes that define the errors of force, and the floor of these errors due to the reference's noise."""
     simulated = next((row for row in board.finished if row.get("reference_score") is not None), None)
     if simulated is not None:
         true, noisy = (metric_name({**row, "unit": "1"}) for row in (simulated, against_reference(simulated)))
-        text = f"{true[:1].upper()}{true[1:]}: against the force exerted. {noisy}: against the noisy reference."
-        yield Note(text, printed=True)
-    known = [row for row in board.answers if row.get("score_beyond_floor") is not None]
-    if not known:
-        return
+        yield f"{true[:1].upper()}{true[1:]}: against the force exerted. {noisy}: against the noisy reference."
     parts = []
+    known = [row for row in board.answers if row.get("score_beyond_floor") is not None]
     for sensor, rows in grouped(known, lambda row: str(row["sensor"])).items():
-        unit, floors = rows[0]["unit"], sorted(row["reference_floor"] for row in rows)
-        ends = dict.fromkeys(score(end, unit) for end in (floors[0], floors[-1]))
+        unit, floors = rows[0]["unit"], [row["reference_floor"] for row in rows]
+        ends = dict.fromkeys(score(end, unit) for end in (min(floors), max(floors)))
         reach = 1.96 * max(row.get("reference_floor_se") or 0.0 for row in rows)
         parts.append(f"{sensor} {' … '.join(ends)}{f' ± {score(reach, unit)}' if reach else ''}")
     by = "; places go by it" if board.placed and board.by_floor else ""
-    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)}).")
+    if parts:
+        yield f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)})."
 
 
-def _compared(board: Board) -> Iterator[Note]:
+def _compared(board: Board) -> Iterator[str]:
     """Yield a note on the comparison of several sensors on recordings, and on its limitations."""
     rows = [row for row in board.placed if held_out(row)]
     if not board.ranks or len({row["sensor"] for row in rows}) < 2:
@@ -249,35 +216,25 @@ def _compared(board: Board) -> Iterator[Note]:
     parts = [f"paired over {unit}, which all rows share" if shared else f"unpaired: {unit} differ between rows"]
     trivial = [bar for row in rows if (bar := board.bars.score(row)) is not None]
     if not rows[0]["classes"] and trivial and max(trivial) > 1.05 * min(trivial):
-        ends = (score(end, rows[0]["unit"]) for end in (min(trivial), max(trivial)))
-        parts.append(f"the targets differ between sensors (trivial answers {' … '.join(ends)})")
+        ends = interval(min(trivial), max(trivial), rows[0]["unit"])
+        parts.append(f"the targets differ between sensors (trivial answers {ends})")
     if {row.get("n_specimens") for row in rows} == {1}:
         parts.append("one specimen of each sensor: how specimens differ is not known")
-    yield Note(f"Places: {'; '.join(parts)}.", printed=True)
+    yield f"Places: {'; '.join(parts)}."
 
 
-def _how(board: Board) -> Iterator[Note]:
+def _how(board: Board) -> Iterator[str]:
     """Yield a note that defines score and interval."""
-    sentences = []
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
-        counts = [row["n_replicates"] for row in campaigns]
+        counts = count_range([row["n_replicates"] for row in campaigns], "campaign")
         covered = [least_coverage(row["n_replicates"]) for row in campaigns if row["ci_low"] is not None]
         least = f"; interval: of that median, coverage at least {100 * min(covered):.3g} %" if covered else ""
-        median = f"median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
-        several = f"Score: {median}{least}"
-        sentences.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
-    if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
-        sentences.append("Open: so few put no upper bound to the error")
-    if sentences:
-        yield Note(f"{'. '.join(sentences)}.")
+        yield f"Score: median over {counts}, each simulated anew with its own seed{least}."
 
 
-def _hosts(board: Board) -> Iterator[Note]:
+def _hosts(board: Board) -> Iterator[str]:
     """Yield a note with the reason why the times of a block cannot be compared."""
-    timed = [row for row in board.answers if row["fit_s"] is not None]
-    hosts = len({str(row.get("host") or "") for row in timed})
-    at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)
-    why = [f"taken on {hosts} hosts"] * (hosts > 1) + [f"taken while up to {at_once} cells ran"] * (at_once > 1)
-    if why:
-        yield Note(f"Times cannot be compared: {' and '.join(why)}.")
+    hosts = {row["host"] for row in board.answers if row["fit_s"] is not None}
+    if len(hosts) > 1:
+        yield f"Times cannot be compared: they were taken on {len(hosts)} hosts."

@@ -7,7 +7,6 @@ Control characters in its texts are escaped (`text.visible`); formats escape the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -26,21 +25,19 @@ from tactbench.core.leaderboard.names import (
     metric_name,
     split_name,
 )
-from tactbench.core.leaderboard.probe import build_probe, with_leaks
-from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
+from tactbench.core.leaderboard.probe import with_leaks
+from tactbench.core.leaderboard.sentences import NO_BETTER, Board, above, below
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import installed
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
-from tactbench.core.tables.text import cut, visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable, field_text
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.store import Store
 
 _Key = tuple[str, str, str, str]
-LONGEST = 1000
-"""Largest number of characters of a sentence on provenance."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ class Block:
     lines: tuple[Line, ...]
     verdict: tuple[str, ...] = ()
     """At most two sentences above the table, on the outcome of the comparison."""
-    notes: tuple[Note, ...] = ()
+    notes: tuple[str, ...] = ()
     """At most five notes below the table, on marks and numbers."""
 
 
@@ -66,7 +63,7 @@ class Table:
 
     blocks: tuple[Block, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: event detection and leakage probes."""
+    """Tables below the blocks: event detection."""
     provenance: tuple[Row, ...] = ()
     """Software versions, machine and commit of each run with rows in the table."""
 
@@ -81,17 +78,9 @@ class Table:
         return [line.row for line in self.lines]
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """The notes of all blocks without repetitions."""
-        return tuple(dict.fromkeys(note.text for block in self.blocks for note in block.notes))
-
-    @property
     def footer(self) -> tuple[str, ...]:
-        """The provenance in sentences, for tables in files."""
-        from tactbench.core.provenance.gather import foot
-
-        made_by = foot(self.provenance) if self.provenance else ()
-        return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
+        """The provenance as text, for tables in files."""
+        return tuple(visible(f"Made with {field_text(one)}.") for one in self.provenance)
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -127,8 +116,7 @@ def build_table(
     groups = sorted(_grouped(sorted(rows, key=itemgetter("cell"))).items(), key=lambda group: _order(group[0]))
     blocks = tuple(_block(key, members, (questions or {}).get(key[0], "")) for key, members in groups)
     ordered = [line.row for block in blocks for line in block.lines]
-    sections = (events_table(ordered), build_probe(ordered))
-    return Table(blocks, tuple(section for section in sections if section is not None), tuple(provenance))
+    return Table(blocks, tuple(filter(None, [events_table(ordered)])), tuple(provenance))
 
 
 def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
@@ -137,8 +125,9 @@ def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
     finished = [row for row in members if row["status"] == "done"]
     answers = [row for row in finished if not row["is_baseline"]]
     entered = [row for row in answers if not bars.no_better(row)]
-    order = dict(zip((row["cell"] for row in entered), errors(entered), strict=True))
-    entered.sort(key=lambda row: (order[row["cell"]], error_of(row)))  # equal ones in the order of their names
+    # Squares beyond the floor may be negative, so that answers of one sensor keep their order there.
+    first = excess_of if beyond_floor(entered) else error_of
+    entered.sort(key=lambda row: (first(row), error_of(row)))  # equal ones in the order of their names
     ranks: dict[str, Rank] = {}
     if entered and all(map(_may_be_placed, entered)):
         from tactbench.core.statistics.ranking import ranks as ranks_of  # numerics
@@ -166,16 +155,16 @@ def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
             *map(line_of, stopped),
         ),
         verdict=tuple(map(visible, above(board))),
-        notes=tuple(one._replace(text=visible(one.text)) for one in below(board)),
+        notes=tuple(map(visible, below(board))),
     )  # fmt: skip
 
 
 def _origin(finished: Sequence[Row], hardware: str) -> str:
     if not finished:
         return "nothing finished"
-    if finished[0].get("emulated"):
-        return f"EMULATED devices (rig {finished[0]['rig']}): no sensor was touched"
-    return "SIMULATED: no sensor was touched" if finished[0]["simulated"] else f"MEASURED ({hardware})"
+    if hardware.startswith("rig "):
+        return f"MEASURED ({hardware})"
+    return f"{hardware.replace('SIM', 'SIMULATED')}: no sensor was touched"
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
@@ -206,14 +195,3 @@ def _may_be_placed(row: Row) -> bool:
     """Return True if a row has enough campaigns or held-out units for a place."""
     enough = (row.get("n_replicates") or 0) >= FEWEST
     return enough if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None
-
-
-def errors(results: Sequence[Row]) -> list[float]:
-    """Return (n,) numbers by which answers with one metric are ordered; smaller is better.
-
-    These are signed scores; for errors of force, mean squares beyond the floor of the reference, if all rows have one,
-    which may be negative where the error beyond the floor is 0, so that answers of one sensor keep their order.
-    """
-    if beyond_floor(results):
-        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
-    return list(map(error_of, results))

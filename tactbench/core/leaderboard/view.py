@@ -65,10 +65,8 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     """Return the table to print for a block, with the columns of `view`."""
-    short = not view.wide and not view.columns
     # A note states why trivial answers were skipped.
-    shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
-    shown = shown or list(block.lines)
+    shown = [one for one in block.lines if one.kind != "skipped" or not one.row["is_baseline"]] or list(block.lines)
     texts = list(map(_texts, shown))
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in texts[0])
@@ -81,7 +79,7 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         kinds=tuple(line.kind for line in shown),
         origin=block.origin,
         summary=(block.setting, *block.verdict),
-        notes=tuple(note.text for note in block.notes),
+        notes=block.notes,
         first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )
@@ -98,17 +96,18 @@ def _texts(line: Line) -> dict[str, str]:
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     """Return the headings of columns, such as metric and unit for a score, and confidence level for an interval."""
-    rows = [line.row for line in block.lines]
-    unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
-    levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
-    interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
+    row = block.lines[0].row
+    unit = "" if row["unit"] == "1" else visible(f" [{row['unit']}]")
+    interval = "interval"
     results = [line.row for line in block.lines if line.kind == "result"]
-    known = [row for row in results if row["ci_low"] is not None and row.get("n_replicates")]
+    known = [one for one in results if one["ci_low"] is not None and one.get("n_replicates")]
     if known:
+        levels = {percent(one["n_replicates"], one.get("replicate_unit")) for one in known}
         of = str(known[0]["replicate_unit"]) if held_out(known[0]) else "campaign"
-        interval += f" over {visible(count_range([row['n_replicates'] for row in known], of))}"
-    shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
-    shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(rows[0]))}
+        over = visible(count_range([one["n_replicates"] for one in known], of))
+        interval = f"{levels.pop()} interval over {over}" if len(levels) == 1 else f"interval over {over}"
+    shown = {"score": metric_name(row), "interval": interval, "notes": ""}
+    shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(row))}
     return tuple(shown.get(name, name) for name in names)
 
 

@@ -88,46 +88,39 @@ class Keys:
         if rig_file is not None and not rig_file.emulated:
             return sections
         registry, shape = self.registry, scene.indenter.shape
-        owner, carriers = registry.sensors.owned(sensor), [registry.rigs.owned(rig)]
+        owner, rigs = registry.sensors.owned(sensor), [rig]
         modules = [owner.module, owner.descriptor.transducer, owner.descriptor.driver]
         if rig_file is not None:
             names = [entry.device for entry in (rig_file.force, *rig_file.devices.values()) if entry is not None]
             modules += [registry.devices.owned(name).module for name in names]
-            carriers.append(registry.rigs.owned(rig_file.emulation.physics))
-        for effect in taking_part(registry, owner.descriptor, scene):
-            modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-        for one in carriers:
-            modules += [one.module, one.descriptor.where]
-        if shape is not None and shape in registry.indenters:  # the rig refuses an unknown one
-            indenter = registry.indenters.owned(shape)
-            modules += [indenter.module, indenter.descriptor.where]
+            rigs.append(rig_file.emulation.physics)
+        effects = taking_part(registry, owner.descriptor, scene)
+        modules += [effect.descriptor.called_for for effect in effects]
+        shapes = [shape] if shape is not None and shape in registry.indenters else []  # the rig refuses an unknown one
+        makers: list[Any] = [*effects, *map(registry.rigs.owned, rigs), *map(registry.indenters.owned, shapes)]
+        modules += [name for one in makers for name in (one.module, one.descriptor.where)]
         return sections | {"versions": versions(), "source": sources_of(filter(None, modules), RECORDING)}
 
 
 def differences(
-    before: Mapping[str, Any],
-    now: Mapping[str, Any],
-    within: str = "",
-    *,
-    same: Callable[[Any, Any], bool] = lambda old, new: _canonical(old) == _canonical(new),
+    before: Mapping[str, Any], now: Mapping[str, Any], same: Callable[[Any, Any], bool] | None = None, within: str = ""
 ) -> list[str]:
     """Return one sentence, ``name old -> new``, for each difference of two nested mappings.
 
     Parameters
     ----------
-    within
-        Text at the beginning of each sentence.
     same
         Function that compares values that are not mappings; by default as JSON.
+    within
+        Text at the beginning of each sentence.
     """
     found = []
     for name in sorted({*before, *now}):
         old, new = before.get(name), now.get(name)
-        place = f"{within}{name}"
         if isinstance(old, Mapping) and isinstance(new, Mapping):
-            found += differences(old, new, f"{place}: ", same=same)
-        elif not same(old, new):
-            found.append(f"{place} {_short(old)} -> {_short(new)}")
+            found += differences(old, new, same, f"{within}{name}: ")
+        elif not (same(old, new) if same else _canonical(old) == _canonical(new)):
+            found.append(f"{within}{name} {_short(old)} -> {_short(new)}")
     return found
 
 

@@ -125,7 +125,7 @@ def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
     for sections in (first, second):  # a run times its first replicate, which may be another's second
         sections["configuration"] = {**(sections["configuration"] or {}), "timed": None}
     old, new = ({name: row[name] for name in SEED_DECIDES} for row, _ in (one, other))
-    return "; ".join((differences(first, second) or differences(old, new, same=_same))[:3])
+    return "; ".join((differences(first, second) or differences(old, new, _same))[:3])
 
 
 def _same(one: Any, other: Any) -> bool:

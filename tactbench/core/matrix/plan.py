@@ -23,6 +23,8 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
 _AS_PLANNED = Simulation()
+Way = tuple[str, str | None]
+"""A protocol and a split; None: the task's first split that is possible with the recordings."""
 
 ALIKE = (
     "sensor", "task", "rig", "protocol", "split", "estimator", "seed", "declared_task", "include_incomplete",
@@ -92,67 +94,55 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if rig.simulated else 1)
         for name, owned in tasks.items()
     }
-    for replicate in range(max(own.values())):
-        for choice in matrix.tasks:
-            if replicate >= own[choice.name]:
-                continue
-            owned = tasks[choice.name]
-            task = owned.descriptor.spec
-            ways = _ways(task, choice)
-            answers = _estimators(task, choice, registry)
-            for sensor in sensors:
-                for (protocol, split), chosen in product(ways, answers):
-                    cell = Cell(
-                        sensor=sensor,
-                        task=task.name,
-                        rig=rig.name,
-                        protocol=protocol,
-                        split=split,
-                        estimator=chosen.name,
-                        params=tuple(sorted(chosen.params.items())),
-                        baseline=registry.estimators[chosen.name].baseline,
-                        seed=matrix.seed + replicate,
-                        timed=matrix.latency and replicate == 0,
-                        simulation=matrix.simulation,
-                        include_incomplete=matrix.include_incomplete,
-                        declared_task=owned.declared,
-                    )
-                    cells[cell] = None  # each once, in the order of the matrix
-    return with_probes(list(cells), registry) if matrix.probe else list(cells)
-
-
-def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
-    """Return `cells`, followed by additional cells that probe these cells for leakage.
-
-    Every cell, except for baselines of other tasks, is also evaluated under `deployable` with its own split, under
-    `first-frame`, and with shuffled rows. A split in time separates no recordings and is not probed; UsageError is
-    raised if all cells have such a split.
-    """
-    if cells and all(cell.split == "in-session" for cell in cells):
+    for replicate, choice in product(range(max(own.values())), matrix.tasks):
+        owned = tasks[choice.name]
+        task = owned.descriptor.spec
+        ways = _ways(task, choice)
+        ways += _probes(task, ways) if matrix.probe else []
+        for sensor, (protocol, split), chosen in product(sensors, ways, _estimators(task, choice, registry)):
+            if replicate < own[choice.name]:
+                cell = Cell(
+                    sensor=sensor,
+                    task=task.name,
+                    rig=rig.name,
+                    protocol=protocol,
+                    split=split,
+                    estimator=chosen.name,
+                    params=tuple(sorted(chosen.params.items())),
+                    baseline=registry.estimators[chosen.name].baseline,
+                    seed=matrix.seed + replicate,
+                    timed=matrix.latency and replicate == 0,
+                    simulation=matrix.simulation,
+                    include_incomplete=matrix.include_incomplete,
+                    declared_task=owned.declared,
+                )
+                cells[cell] = None  # each once, in the order of the matrix
+    if matrix.probe and all(cell.split == "in-session" for cell in cells):
         raise UsageError(
             "The split in-session cannot be probed: it divides each recording in time.",
             hint="Give another --split, or leave out --probe.",
         )
-    every = dict.fromkeys(cells)
-    planned = frozenset(every)
-    for cell in cells:
-        rules = protocol_called(cell.protocol)
-        task = registry.tasks[cell.task].spec
-        other = cell.baseline and cell.estimator not in task.baselines
-        if rules.first_row_only or cell.split == "in-session" or other:
-            continue
-        if rules.roles_only and task.splits[:1] == ("roles",):
-            same = replace(cell, protocol=DEPLOYABLE.name, split=None)
-            if same in planned:
-                continue  # already planned, and probed by itself
-        split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
-        honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
-        added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
-        every |= dict.fromkeys(added)
-    return list(every)
+    return list(cells)
 
 
-def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
+def _probes(task: TaskSpec, ways: Sequence[Way]) -> list[Way]:
+    """Return the ways in which the answers of `ways` are probed for leakage.
+
+    These are `deployable` with the same split, `first-frame`, and shuffled rows. A split in time separates no
+    recordings and is not probed.
+    """
+    found = []
+    for protocol, split in ways:
+        rules = protocol_called(protocol)
+        if rules.roles_only:
+            split = None if task.splits[:1] == ("roles",) else "roles"
+        honest = None if split == "shuffled" else split
+        if not rules.first_row_only and split != "in-session":
+            found += [(DEPLOYABLE.name, honest), (FIRST_FRAME.name, honest), (DEPLOYABLE.name, "shuffled")]
+    return found
+
+
+def _ways(task: TaskSpec, choice: TaskChoice) -> list[Way]:
     """Return all combinations (protocol, split) of the chosen protocols and splits.
 
     UsageError is raised if no combination is compatible; otherwise incompatible combinations become skipped rows.

@@ -142,17 +142,12 @@ def plan_parts(
     cells: dict[str, Cell] = {}
     plan: RecordingPlan = {}
     for part in parts:
-        if part.trouble is None:
-            some, own = plan_run(part, registry, keys, store, limits)
-        else:
-            some = plan_cells(part.matrix, part.matrix.sensors, registry)
-            own = {request_key(cell): RecordingSource((), trouble=part.trouble) for cell in some}
-        for cell in some:
-            if cells.setdefault(cell.name, cell) is not cell:
-                raise UsageError(
-                    f"{cell.name} is planned for two folders of recordings.",
-                    hint="Run one folder at a time, each with its own --out.",
-                )
+        some, own = plan_run(part, registry, keys, store, limits)
+        named = {cell.name: cell for cell in some}
+        for name in cells.keys() & named:
+            hint = "Run one folder at a time, each with its own --out."
+            raise UsageError(f"{name} is planned for two folders of recordings.", hint=hint)
+        cells |= named
         plan |= own
     return list(cells.values()), plan
 
@@ -170,6 +165,9 @@ def plan_run(
         If a rig that is not simulated cannot be built or cannot list its recordings, or a recording cannot be read.
     """
     matrix = part.matrix
+    if part.trouble is not None:
+        cells = plan_cells(matrix, matrix.sensors, registry)
+        return cells, {request_key(cell): RecordingSource((), trouble=part.trouble) for cell in cells}
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
     if not rig.simulated:  # a simulated one replays nothing: it is built when it has to record
@@ -183,14 +181,12 @@ def plan_run(
     if not matrix.sensors:
         raise UsageError("No sensor is given.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry)
-    for cell in cells:
-        _check_split(registry.tasks[cell.task].spec, cell.split)
     plan: RecordingPlan = {}
-    for key, made in requests_for(cells, registry, keys, store, rig_file).items():
-        trouble = _unanswerable(key, registry, rig, rig_file) or (None if made else _no_scenes(key, matrix))
-        plan[key] = (
-            RecordingSource((), trouble=trouble) if trouble else RecordingSource([one.path for one in made], made)
-        )
+    for key, requests in requests_for(cells, registry, keys, store, rig_file).items():
+        _check_split(registry.tasks[key[1]].spec, key[2])
+        trouble = _unanswerable(key, registry, rig, rig_file) or (None if requests else _no_scenes(key, matrix))
+        made = () if trouble else requests
+        plan[key] = RecordingSource([one.path for one in made], made, trouble)
     reasons = {str(one.trouble) for one in plan.values()}
     if plan and not rig.simulated and all(one.trouble is not None for one in plan.values()):
         raise UsageError(f"No task can be recorded: {'; '.join(sorted(reasons))}", hint="Choose another task or rig.")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import ALIKE, Cell
-from tactbench.core.matrix.store.index import signature
+from tactbench.core.matrix.store.store import signature
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance.gather import host_id
@@ -55,12 +55,12 @@ def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
         return
     _prepared.add((os.getpid(), estimator.name, kind))
     with suppress(Exception):
-        build = load_object(estimator.where)
-        build(kind=kind, seed=0, threads=1, **estimator.params)
+        params = {**estimator.params, **(estimator.rehearsal or {})}
+        made = load_object(estimator.where)(kind=kind, seed=0, threads=1, **params)
         if estimator.rehearsal is not None:
             from tactbench.core.evaluation.warm_up import rehearse
 
-            rehearse(build(kind=kind, seed=0, threads=1, **{**estimator.params, **estimator.rehearsal}), kind)
+            rehearse(made, kind)
 
 
 _prepared: set[tuple[int, str, str]] = set()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError, did_you_mean
+from tactbench.core.files import named_file
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.plan import Cell, cell_of
@@ -33,27 +34,20 @@ class StoredCell:
     row: Row
     paths: list[Path]
 
-    def changes(self) -> tuple[str, list[str]]:
-        """Return the cell's key as of now, and sentences with the reasons why a run would not reuse its result.
-
-        The key is empty if recordings are missing. Differences from the stored key come before missing files.
-        """
+    def changes(self) -> list[str]:
+        """Return sentences with the reasons why a run would not reuse the result: differences, then missing files."""
         missing = [path for path in self.paths if not path.exists()]
-        reasons = [] if self.paths else ["there are no recordings of the cell"]
-        if missing:
-            text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
-            reasons = [f"{text}: they were never made, were removed, or have another key now"]
         try:
             digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
             before = self.store.cell(self.row).sections
             key, now = Keys(self.registry).of_cell(self.cell, digests)
         except TactbenchError as error:
-            return "", [str(error)]
-        if not reasons and self.store.finished(key) is not None:
-            return key, []
-        if missing:
-            key, before, now = "", *({**one, "data": {}} if one else {} for one in (before, now))
-        return key, [*(differences(before, now) if before else []), *reasons]
+            return [str(error)]
+        if not missing:
+            return [] if self.store.finished(key) or not before else differences(before, now)
+        text = f"{len(missing)} of {len(self.paths)} recordings are missing, {missing[0].stem} first"
+        reason = f"{text}: they were never made, were removed, or have another key now"
+        return [*(differences({**before, "data": {}}, {**now, "data": {}}) if before else []), reason]
 
     def again(self, progress: Progress) -> tuple[Row, list[str], int]:
         """Compute the cell again in this process, without changing the result folder.
@@ -67,34 +61,27 @@ class StoredCell:
             if self.registry.rigs[self.cell.rig].simulated:
                 requests = requests_for([self.cell], self.registry, keys, again)[need]
                 source = RecordingSource([request.path for request in requests], requests)
-            choice = EngineChoice("in-process")
-            run = Run(again, self.registry, keys, {need: source}, choice, None, progress)
+            run = Run(again, self.registry, keys, {need: source}, EngineChoice("in-process"), None, progress)
             run.carry_out([self.cell], timed=True)
             row = run.rows[self.cell.name]
             done = row["status"] == self.row["status"] == "done"
-            old, new = (
-                {name: one[name] for name in (SEED_DECIDES if done else ("status", "reason"))}
-                for one in (self.row, row)
-            )
-            if done:
-                for facts, kept in ((old, self.store.cell(self.row)), (new, again.cell(row))):
-                    facts |= {"recording": kept.sections["data"], "answers": kept.digests}
+            compared = SEED_DECIDES if done else ("status", "reason")
+            old, new = ({name: one[name] for name in compared} for one in (self.row, row))
+            for facts, kept in ((old, self.store.cell(self.row)), (new, again.cell(row))) if done else ():
+                facts |= {"recording": kept.sections["data"], "answers": kept.digests}
         return row, differences(old, new), run.recorded
 
 
 def stored_cell(store: Store, given: str) -> StoredCell:
-    """Return the stored cell whose name contains `given`, see `meant`; raises UsageError if a recording is missing."""
+    """Return the stored cell whose name contains `given`, see `meant`."""
     rows = {row["cell"]: row for row in store.rows()}
     row = rows[meant(given, list(rows))]
     registry, cell = with_declared_of(installed(), [row]), cell_of(row)
+    paths = [store.folder / named_file(path) for path in row["recordings"]]
     if registry.rigs[cell.rig].simulated:
         requests = requests_for([cell], registry, Keys(registry), store)[request_key(cell)]
-        return StoredCell(store, registry, cell, row, [request.path for request in requests])
-    for path, file in store.recordings(row):
-        if file is None:
-            hint = "Run the matrix again with --rig replay --recordings DIR."
-            raise UsageError(f"The recording {path} does not exist.", hint=hint)
-    return StoredCell(store, registry, cell, row, [file for _, file in store.recordings(row) if file is not None])
+        paths = [request.path for request in requests]
+    return StoredCell(store, registry, cell, row, paths)
 
 
 def meant(given: str, names: Sequence[str]) -> str:
@@ -113,7 +100,7 @@ def meant(given: str, names: Sequence[str]) -> str:
     if given in names:
         return given
     parts = "/(.*/)?".join(map(re.escape, given.split("/")))
-    patterns = rf"{re.escape(given)}/\d+$", f"(^|/){parts}(/|$)", re.escape(given)
+    patterns = f"(^|/){parts}(/|$)", re.escape(given)
     found = next(filter(None, ([one for one in names if re.search(pattern, one)] for pattern in patterns)), [])
     if len({_replicate(name)[0] for name in found}) == 1:
         return min(found, key=_replicate)

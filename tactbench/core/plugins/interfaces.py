@@ -198,12 +198,6 @@ class CostPoint:
     unit: str
     floor: float
     """Standard deviation of the observable's own noise; infinity for an observable without noise."""
-    default: bool
-    """True if this is the default setting."""
-    rung: str
-    """Name of the solver setting (rung) that this point shows; empty: it shows none."""
-    settings: Mapping[str, Scalar]
-    """Parameters of this setting by name."""
 
 
 class CostJob(NamedTuple):
@@ -212,8 +206,6 @@ class CostJob(NamedTuple):
     label: str
     run: Callable[[], list[CostPoint]]
     """Function that makes the measurement; a TactbenchError raised in it becomes a row."""
-    rung: str = ""
-    """Name of the solver setting (rung) of the measured points."""
 
 
 class CostStudy(NamedTuple):

@@ -82,16 +82,16 @@ def run_child(
     for item in items:
         os.ftruncate(printed, 0)  # the log holds the output of one item
         connection.send(("begun", resident_mb(me), ""))
-        kind, value = _carry_out(work, item, limits)
+        outcome = _carry_out(work, item, limits)
         if os.getpid() != me:
             os._exit(0)  # a child that the work forked and that returned from it
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):
                 stream.flush()
         try:
-            connection.send((kind, value, end_of(printed)))
+            connection.send(("ended", outcome, end_of(printed)))
         except Exception as error:  # it cannot be pickled
-            connection.send(("error", plain_error(error), end_of(printed)))
+            connection.send(("ended", plain_error(error), end_of(printed)))
     with suppress(EOFError, OSError):
         connection.recv()  # the parent ends this process together with its group
 
@@ -102,19 +102,16 @@ def end_of(log: int) -> str:
     return os.read(log, LOG_BYTES).decode(errors="replace")
 
 
-def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:
-    """Carry out an item; return "value" and its result, or "error" and the error."""
+def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> Any:
+    """Carry out an item; return its result or the error."""
     if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
         faulthandler.dump_traceback_later(limits.timeout_s)
     try:
-        return "value", work(item)
+        return work(item)
     except _Terminated:
         os._exit(0)
-    except MemoryError as error:
-        where = "".join(traceback.format_exception(error))
-        return "error", OutOfMemory("Memory ran out.", hint="Give a smaller --jobs.", traceback_text=where)
     except BaseException as error:
-        return "error", plain_error(error)
+        return plain_error(error)
     finally:
         faulthandler.cancel_dump_traceback_later()
 
@@ -153,4 +150,6 @@ def plain_error(error: BaseException) -> TactbenchError:
     if isinstance(error, TactbenchError) and getattr(errors, type(error).__name__, None) is type(error):
         error.traceback_text = error.traceback_text or where
         return error
+    if isinstance(error, MemoryError):
+        return OutOfMemory("Memory ran out.", hint="Give a smaller --jobs.", traceback_text=where)
     return Raised(error_text(error), traceback_text=where)

@@ -123,7 +123,7 @@ class Pool(Engine):
                 thread.start()
                 running += 1
             try:
-                ended = self._ended.get(timeout=1.0)  # on Windows, Ctrl-C does not interrupt a wait without end
+                ended = self._ended.get(timeout=POLL_S)  # on Windows, Ctrl-C does not interrupt a wait without end
             except Empty:
                 continue
             if ended is None:
@@ -182,10 +182,9 @@ class _Child:
             try:
                 if self._connection.poll(POLL_S):
                     kind, value, log = self._connection.recv()
-                    if kind == "begun":
-                        began_s, shared_mb = time.monotonic(), value
-                        continue
-                    return _with_log(value, log, began_s)
+                    if kind == "ended":
+                        return _with_log(value, log, began_s)
+                    began_s, shared_mb = time.monotonic(), value
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
             except (EOFError, OSError):  # it has ended, or closed the connection
                 self._process.join(1.0)
@@ -213,14 +212,12 @@ class _Child:
 
     def _crashed(self) -> Crashed:
         code = self._process.exitcode or 0
-        if code >= 0:
-            text = f"The process ended with exit code {code} and gave no result."
-            return Crashed(text, hint="A plugin may have called os._exit or closed a file of the process.")
-        name = next((one.name for one in signal.Signals if one == -code), "unknown")
-        hint = "See the last lines of its log."
-        if name == "SIGKILL":
-            hint = "If memory was short, give a smaller --jobs, or a limit with --memory MB."
-        return Crashed(f"The process was ended by signal {-code} ({name}).", hint=hint, signal=-code)
+        if code < 0:
+            hint = "See its log. If memory was short, give a smaller --jobs, or a limit with --memory MB."
+            text = f"The process was ended by signal {-code} ({signal.Signals(-code).name})."
+            return Crashed(text, hint=hint, signal=-code)
+        text = f"The process ended with exit code {code} and gave no result."
+        return Crashed(text, hint="A plugin may have called os._exit or closed a file of the process.")
 
     def end(self, *, unfinished: bool) -> None:
         """End the process and its group; if `unfinished`, after the grace time, in which devices can be closed."""

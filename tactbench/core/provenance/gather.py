@@ -1,4 +1,4 @@
-"""Provenance of a run: its software and machine, gathered once and summarised below tables.
+"""Provenance of a run: its software and machine, gathered once and shown below tables.
 
 A provenance contains no time, path, or name of a person or host: equal circumstances give equal provenance.
 """
@@ -10,21 +10,16 @@ import os
 import platform
 import re
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
-
-import psutil
 
 import tactbench
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.provenance.source import PACKAGE, RELEVANT, source_digest, version_of
 from tactbench.core.thread_limit import VARIABLES
-
-GIT_S = 10.0
-"""Time limit for git [s], as a checkout may be on a slow network disk."""
 
 
 def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
@@ -36,7 +31,6 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "platform": f"{platform.system()}-{platform.release()}-{platform.machine()}",
         "cpu": cpu_model(),
         "cores": os.cpu_count(),
-        "memory_mb": psutil.virtual_memory().total // 2**20,
         "host": host_id(),
         "threads": next((os.environ[name] for name in VARIABLES if name in os.environ), "1"),
         "plugins": list(_plugins(registry)),
@@ -50,14 +44,14 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@lru_cache(maxsize=1)
+@cache
 def host_id() -> str:
     """Return a digest of 12 hexadecimal digits that identifies the host without its name."""
     parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
 
 
-@lru_cache(maxsize=1)
+@cache
 def cpu_model() -> str:
     """Return the model name of the processor, or "unknown"."""
     with suppress(OSError):
@@ -79,23 +73,6 @@ def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
 def _commit(folder: Path) -> str:
     """Return the git commit of the checkout that contains `folder`, with ``+changes`` if files differ from it."""
     command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
-    try:
-        found = subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=True)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return found.stdout.strip()
-
-
-def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return sentences on the software and machines of several provenances, without repetitions."""
-    return tuple(dict.fromkeys(text for one in filter(None, several) for text in _sentences(one)))
-
-
-def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    commit = f" ({one['commit']})" if one["commit"] else ""
-    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
-    made_with = f"Python {one['python']}, {libraries}, BLAS threads: {one['threads']}"
-    yield f"tactbench {one['tactbench']}{commit}, {made_with}."
-    for plugin in one["plugins"]:
-        yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores, {one['memory_mb'] / 1024:.0f} GiB."
+    with suppress(OSError, subprocess.SubprocessError):
+        return subprocess.check_output(command, stderr=subprocess.DEVNULL, text=True).strip()
+    return ""

@@ -8,8 +8,8 @@ import importlib.util
 import pickle
 import pickletools
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ RECORDING = (*_BOTH, "core/acquisition", "links", "devices")
 """Parts of tactbench that can affect every recording, in addition to those of the sensor and the rig."""
 
 
-@lru_cache(maxsize=256)
+@cache
 def source_digest(package: str, below: str = "") -> str:
     """Return the digest of all files of an importable package, or of the module or sub-package `below` in it.
 
@@ -42,7 +42,7 @@ def source_digest(package: str, below: str = "") -> str:
             place = path.relative_to(root)
             if not left_out.intersection(place.parts) and not any(part.startswith(".") for part in place.parts):
                 sha.update(f"\0{place.as_posix()}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
-    return sha.hexdigest()[:32]
+    return sha.hexdigest()
 
 
 def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
@@ -62,13 +62,13 @@ def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
         places.add((package, "/".join(below[:2]) if package == PACKAGE else ""))
     found = {}
     for package, place in sorted(places):
-        folder = place if (Path(__file__).parents[2] / place).is_dir() else f"{place}.py"
-        name = f"{package}.{place.replace('/', '.')}" if place else package
-        found[name] = source_digest(package, folder if place else "")
+        module = "" if (Path(__file__).parents[2] / place).is_dir() else ".py"
+        name = ".".join(filter(None, [package, *place.split("/")]))
+        found[name] = source_digest(package, place and f"{place}{module}")
     return found
 
 
-@lru_cache(maxsize=64)
+@cache
 def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
     """Return the versions of Python, numpy, scipy, scikit-learn and the distributions `more`, by name."""
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
@@ -84,8 +84,8 @@ def version_of(distribution: str) -> str:
 
 
 def digest_of(text: str) -> str:
-    """Return the digest of a text, for a key or an identifier, as 32 hexadecimal digits."""
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    """Return the SHA-256 digest of a text, for a key or an identifier, as hexadecimal digits."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def identity_of(value: Any) -> dict[str, Any]:
@@ -104,24 +104,23 @@ def identity_of(value: Any) -> dict[str, Any]:
     """
     import joblib
 
+    found: dict[str, str] = {}
+    distributions: set[str] = set()
     try:
         codes = pickletools.genops(pickle.dumps(value, 2, fix_imports=False))  # this one has modules as text
         modules = {str(argument).split()[0] for code, argument, _ in codes if code.name == "GLOBAL"}
-        script = {name: Path(sys.modules[name].__file__ or "").read_bytes() for name in modules & {"__main__"}}
+        for top in {name.partition(".")[0] for name in modules} - sys.stdlib_module_names:
+            file = Path(sys.modules[top].__file__ or "")
+            if top == "__main__":
+                found[top] = hashlib.sha256(file.read_bytes()).hexdigest()
+            elif {"site-packages", "dist-packages"}.intersection(file.parts):
+                distributions.update(_distributions()[top])
+            else:
+                found |= sources_of([top], ())
     except Exception as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
-    tops = {name.partition(".")[0] for name in modules - script.keys()} - sys.stdlib_module_names
-    places = {top: Path(getattr(sys.modules[top], "__file__", None) or "").parts for top in tops}
-    installed = {top for top, parts in places.items() if {"site-packages", "dist-packages"}.intersection(parts)}
-    owners = _distributions()
-    source = sources_of(tops - installed, ()) | {
-        name: hashlib.sha256(text).hexdigest() for name, text in script.items()
-    }
-    of = tuple(sorted({owner for top in installed for owner in owners.get(top, ())}))
-    return {"object": joblib.hash(value), "versions": versions(of), "source": source}
+    return {"object": joblib.hash(value), "versions": versions(tuple(sorted(distributions))), "source": found}
 
 
-@lru_cache(maxsize=1)
-def _distributions() -> Mapping[str, list[str]]:
-    """Return the names of the installed distributions that provide each importable package, by package."""
-    return importlib.metadata.packages_distributions()
+_distributions = cache(importlib.metadata.packages_distributions)
+"""Names of the installed distributions that provide each importable package, by package."""

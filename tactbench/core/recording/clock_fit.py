@@ -12,12 +12,11 @@ A recording stores times of the host's clock; for devices with a clock of their 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tactbench.core.errors import FormatError
-from tactbench.core.recording.format import Blocks, Columns
+from tactbench.core.recording.format import Blocks
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, RecordingMeta, StreamClock
 
@@ -72,124 +71,58 @@ def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegm
     )
 
 
-class ClockFit:
-    """Fit of lines to the device's and the host's times of a stream; memory holds at most 37.5 s of these times.
+def fit(device_ns: IntArray, host_ns: IntArray, stretch_ns: int = STRETCH_NS) -> tuple[ClockSegment, ...]:
+    """Return the lines that convert the device's times of a stream to the host's clock, in order of time.
 
-    Every 15 s, a line is fitted to 30 s of times; the last line of a run is fitted to the rest, 22.5 to 37.5 s. A new
-    run of lines begins where the device's times go back, or leap ahead by more than 15 s.
+    Every half stretch (15 s), a line is fitted to a stretch (30 s) of times; the last line of a run is fitted to the
+    rest, 0.75 to 1.25 stretches. A new run of lines begins where the device's times go back, or leap ahead by more than
+    15 s.
 
     Parameters
     ----------
+    device_ns, host_ns
+        (n,) times of the device and of receipt at the host [ns], in order of receipt.
     stretch_ns
         Length of the stretch to which one line is fitted [ns].
     """
-
-    def __init__(self, stretch_ns: int = STRETCH_NS) -> None:
-        self._stretch_ns = stretch_ns
-        self._runs = RunCounter()
-        self._done: list[ClockSegment] = []
-        self._run = 0
-        self._waiting: list[IntArray] = []
-        self._start_ns = 0
-
-    @property
-    def breaks(self) -> int:
-        """Number of steps back in the device's times."""
-        return self._runs.breaks
-
-    def add(self, device_ns: IntArray, host_ns: IntArray) -> None:
-        """Add the device's and the host's times of the next rows, (n,) [ns] each, in order."""
-        run = self._runs.count(device_ns)
-        for number in np.unique(run).tolist():
-            self._extend(number, np.stack((device_ns, host_ns))[:, run == number])
-
-    def segments(self) -> tuple[ClockSegment, ...]:
-        """Return the lines fitted to all rows added so far."""
-        return (*self._done, *self._last())
-
-    def _last(self) -> list[ClockSegment]:
-        return [one_way(self._run, np.concatenate(self._waiting, axis=1))] if self._waiting else []
-
-    def _extend(self, run: int, stamps: IntArray) -> None:
-        if run != self._run or not self._waiting:
-            self._done += self._last()
-            self._run, self._waiting, self._start_ns = run, [], int(stamps[0, 0])
-        # Of rows that came together, the last one waited least.
-        last = np.append(stamps[1, 1:] != stamps[1, :-1], True)
-        self._waiting.append(stamps[:, last])
-        while int(stamps[0, -1]) - self._start_ns >= self._stretch_ns * 5 // 4:
-            waiting = np.concatenate(self._waiting, axis=1)
-            end = int(np.searchsorted(waiting[0], self._start_ns + self._stretch_ns))
-            self._done.append(one_way(self._run, waiting[:, :end]))
-            self._start_ns += self._stretch_ns // 2
-            self._waiting = [waiting[:, int(np.searchsorted(waiting[0], self._start_ns)) :]]
+    found: list[ClockSegment] = []
+    for run, here in _runs(device_ns):
+        stamps, start_ns = np.stack((device_ns[here], host_ns[here])), int(device_ns[here.start])
+        stamps = stamps[:, np.append(stamps[1, 1:] != stamps[1, :-1], True)]  # of rows received together the last one
+        while int(stamps[0, -1]) - start_ns >= stretch_ns * 5 // 4:
+            found.append(one_way(run, stamps[:, : int(np.searchsorted(stamps[0], start_ns + stretch_ns))]))
+            start_ns += stretch_ns // 2
+            stamps = stamps[:, int(np.searchsorted(stamps[0], start_ns)) :]
+        found.append(one_way(run, stamps))
+    return tuple(found)
 
 
-class RunCounter:
-    """Counter of runs of a device's times; a run ends where the times go back, or leap ahead by more than 15 s."""
-
-    def __init__(self) -> None:
-        self._last: int | None = None
-        self._run = 0
-
-        self.breaks = 0
-        """Number of steps back in the times."""
-
-    def count(self, device_ns: IntArray) -> IntArray:
-        """Return, for each of the next rows, the number of its run, (n,), counted from 0."""
-        steps = np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
-        self.breaks += int(np.count_nonzero(steps < 0))
-        run = self._run + np.cumsum((steps < 0) | (steps > LEAP_NS))
-        if len(device_ns):
-            self._last, self._run = int(device_ns[-1]), int(run[-1])
-        return np.asarray(run, dtype=np.int64)
+def _runs(device_ns: IntArray) -> Iterator[tuple[int, slice]]:
+    """Yield the number of each run of a device's times, counted from 0, and the run's rows."""
+    steps = np.diff(device_ns)
+    edges = [0, *(np.flatnonzero((steps < 0) | (steps > LEAP_NS)) + 1).tolist(), len(device_ns)]
+    yield from ((run, slice(*rows)) for run, rows in enumerate(itertools.pairwise(edges)) if len(device_ns))
 
 
-class HostTimes:
-    """Conversion of a device's times to the host's clock, block by block, by the lines of `clock`.
+def host_times(segments: Sequence[ClockSegment], device_ns: IntArray) -> IntArray:
+    """Return the host's times, (n,) [ns], of all the device's times of a stream, by fitted lines.
 
     Between the middles of two lines, times are interpolated from one line to the next, so that they do not jump. Times
     keep their order as long as neighbouring lines differ by less than the 15 s between their middles.
     """
-
-    def __init__(self, clock: StreamClock) -> None:
-        self._runs = RunCounter()
-        self._lines: dict[int, tuple[IntArray, IntArray, FloatArray]] = {}
-        for run, some in itertools.groupby(clock.segments, key=lambda segment: segment.run):
-            lines = list(some)
-            self._lines[run] = (
-                np.array([line.middle_ns for line in lines], dtype=np.int64),
-                np.array([line.offset_ns for line in lines], dtype=np.int64),
-                np.array([line.drift for line in lines], dtype=np.float64),
-            )
-
-    def __call__(self, device_ns: IntArray) -> IntArray:
-        """Return the host's times, (n,) [ns], for the device's times of the next rows.
-
-        Raises
-        ------
-        FormatError
-            If a run of the times has no line.
-        """
-        run = self._runs.count(device_ns)
-        host = np.empty(len(device_ns), dtype=np.int64)
-        for number in np.unique(run).tolist():
-            if number not in self._lines:
-                raise FormatError(
-                    f"No fitted line converts run {number} of a device's times to the host's clock.",
-                    hint="Use the original file: its meta or its device times seem to be changed.",
-                )
-            here = run == number
-            host[here] = _on_lines(device_ns[here], *self._lines[number])
-        return host
+    host = np.empty(len(device_ns), dtype=np.int64)
+    for run, here in _runs(device_ns):
+        lines = [line for line in segments if line.run == run]
+        middle, offset = (np.array([getattr(line, name) for line in lines]) for name in ("middle_ns", "offset_ns"))
+        host[here] = _on_lines(device_ns[here], middle, offset, np.array([line.drift for line in lines]))
+    return host
 
 
 def _on_lines(device: IntArray, middle: IntArray, offset: IntArray, drift: FloatArray) -> IntArray:
     this = np.clip(np.searchsorted(middle, device, side="right") - 1, 0, len(middle) - 1)
     then = np.minimum(this + 1, len(middle) - 1)
-    since = (device - middle[this]).astype(np.float64)
-    apart = np.maximum(middle[then] - middle[this], 1).astype(np.float64)
-    share = np.where((then > this) & (since > 0), since / apart, 0.0)
+    since = device - middle[this]
+    share = np.clip(since / np.maximum(middle[then] - middle[this], 1), 0, 1)
     one = drift[this] * since
     other = (offset[then] - offset[this]) + drift[then] * (device - middle[then])
     return np.asarray(device + offset[this] + np.rint((1 - share) * one + share * other).astype(np.int64))
@@ -217,31 +150,22 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
             j = lowest
 
 
-def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
-    """Return `meta` with lines fitted for every stream in `blocks` that has a device clock.
+def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> tuple[RecordingMeta, dict[str, IntArray]]:
+    """Return `meta` with lines fitted for each stream with a device clock, and the host's times, (n,) [ns], by stream.
 
     A stream with ``device_ns`` has a device clock unless `meta` states that its times are the host's; also in virtual
     time, where a device's link and batches delay samples as well.
     """
     otherwise = StreamClock(source="device")
-    fits: dict[str, ClockFit] = {}
+    stamps: dict[str, list[IntArray]] = {}
     for stream, columns in blocks:
         if "device_ns" in columns and meta.clocks.get(stream, otherwise).source == "device":
-            fits.setdefault(stream, ClockFit()).add(columns["device_ns"], columns["t_ns"])
-    clocks = dict(meta.clocks)
-    for stream, fit in fits.items():
-        clocks[stream] = clocks.get(stream, otherwise).model_copy(
-            update={"method": "hull-1way", "segments": fit.segments(), "breaks": fit.breaks}
-        )
-    return meta.model_copy(update={"clocks": clocks})
-
-
-def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield `blocks` with times converted to the host's clock by lines in `meta`; ``host_ns``: times of receipt."""
-    times: dict[str, HostTimes] = {}
-    for stream, columns in blocks:
-        clock = meta.clocks.get(stream)
-        if clock is not None and clock.segments and "device_ns" in columns:
-            of_host = times.setdefault(stream, HostTimes(clock))
-            columns = {**columns, "host_ns": columns["t_ns"], "t_ns": of_host(columns["device_ns"])}
-        yield stream, columns
+            stamps.setdefault(stream, []).append(np.stack((columns["device_ns"], columns["t_ns"])))
+    clocks, times = dict(meta.clocks), {}
+    for stream, some in stamps.items():
+        device_ns, host_ns = np.concatenate(some, axis=1)
+        lines, breaks = fit(device_ns, host_ns), int(np.count_nonzero(np.diff(device_ns) < 0))
+        times[stream] = host_times(lines, device_ns)
+        fitted = {"method": "hull-1way", "segments": lines, "breaks": breaks}
+        clocks[stream] = clocks.get(stream, otherwise).model_copy(update=fitted)
+    return meta.model_copy(update={"clocks": clocks}), times

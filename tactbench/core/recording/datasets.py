@@ -127,17 +127,12 @@ class DataSet:
                 )
             try:
                 there.fetch(name, downloader=None if copy is None else partial(_copy_file, copy / name))
-            except ValueError as error:  # pooch's word for a digest that differs
-                raise MissingRecordingError(
-                    f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
-                    hint="The file is not kept. Import another version of it with `tactbench import MAPPING`.",
-                ) from error
-            except OSError as error:
+            except (OSError, ValueError) as error:  # ValueError: the file has another digest
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
                     f"{self.name}: {origin} could not be fetched{missed}: {error}. The files belong in {self.files}.",
-                    hint="Put the files there by hand, or name a folder with a copy as `root` (--root DIR). "
-                    "Files fetched before are kept.",
+                    hint="Put the files there by hand, or name a folder with a copy as `root` (--root DIR); import "
+                    "another version of a file with `tactbench import MAPPING`. Files fetched before are kept.",
                 ) from error
             progress.advance(name)
 

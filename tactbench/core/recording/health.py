@@ -126,10 +126,9 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
     A temperature or position may equal its stated limit without saturation; limits of raw counts and forces are used.
     """
     low, high = spec.lower, spec.upper
-    if spec.unit != "count" and (spec.kind not in ("force", "torque") or low == 0):
-        low = None
-    if spec.unit != "count" and spec.kind not in ("force", "torque"):
-        high = None
+    if spec.unit != "count":
+        low = None if low == 0 else low
+        low, high = (low, high) if spec.kind in ("force", "torque") else (None, None)
     return -np.inf if low is None else low, np.inf if high is None else high
 
 

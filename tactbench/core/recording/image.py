@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tactbench.core.errors import FormatError, UnwritableError
-from tactbench.core.files import hdf5_image, writable
+from tactbench.core.files import hdf5_image, replace_file, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
 from tactbench.core.recording.format import Annotations, Array, Blocks, Columns
-from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.reader import content_digest
+from tactbench.core.samples import IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -30,17 +29,18 @@ def store(
     aside: Path,
     replace: bool = False,
     sync: bool = True,
-) -> None:
+) -> RecordingMeta:
     """Write a recording to the temporary path `aside`, check it by reading it back, and rename it to `target`.
 
-    Memory holds the compressed file and some chunks of each stream.
+    Memory holds the compressed file, some chunks of each stream, and the times of streams with a device clock.
 
     Parameters
     ----------
     meta
-        Description of the recording, its clock fits included.
+        Description of the recording; clock fits of devices are added, and the device's times are converted to the
+        host's clock.
     blocks
-        Blocks in the order of receipt; device times are converted to the host's clock here.
+        Blocks in the order of receipt, iterated three times.
     aside
         Temporary path of the file until it has been read back.
     replace
@@ -48,40 +48,35 @@ def store(
     sync
         True: wait until the disk has stored the file; False suits recordings that can be made again.
 
+    Returns
+    -------
+    RecordingMeta
+        `meta` with the clock fits.
+
     Raises
     ------
     RecordingError
         If `target` exists and `replace` is False, the file read back differs from the data, or the disk refuses to
         write; `target` stays unchanged.
     """
-    try:
-        with writable(target):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            image = build(meta, blocks, annotations, complete=True)
-            with aside.open("wb") as file:
-                file.write(image)
-                file.flush()
-                if sync:
-                    os.fsync(file.fileno())
-            try:
-                with open_recording(aside) as written:
-                    written.verify()
-            except FormatError as error:
-                raise UnwritableError(
-                    f"The data of {target}, read back, differ from the data written.", hint="Check the disk."
-                ) from error
-            if not replace:
-                require_free(target)
-            aside.replace(target)
-            if sync and os.name != "nt":  # folders cannot be opened there
-                folder = os.open(target.parent, os.O_RDONLY)
-                try:
-                    os.fsync(folder)
-                finally:
-                    os.close(folder)
-    finally:
-        with suppress(OSError):
-            aside.unlink(missing_ok=True)
+
+    def check(written: Path) -> None:
+        try:
+            content_digest(written)
+        except FormatError as error:
+            raise UnwritableError(
+                f"The data of {target}, read back, differ from the data written.", hint="Check the disk."
+            ) from error
+        if not replace:
+            require_free(target)
+
+    with writable(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        meta, times = on_host_clock(meta, blocks)
+        flagged = {stream for stream, columns in blocks if "quality" in columns}
+        image = hdf5_image(lambda file: _fill(file, meta, _completed(blocks, times, flagged), annotations))
+        replace_file(target, image, aside=aside, check=check, sync=sync)
+    return meta
 
 
 def require_free(path: Path) -> None:
@@ -90,24 +85,22 @@ def require_free(path: Path) -> None:
         raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete the file.")
 
 
-def build(meta: RecordingMeta, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
-    """Return the bytes of an HDF5 file with all blocks and with their digest, computed before HDF5 stores them."""
-    return hdf5_image(lambda file: _fill(file, meta, blocks, annotations, complete))
-
-
-def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotations, complete: bool) -> None:
+def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotations) -> None:
+    """Write a recording into an open HDF5 file, with the digest of the data before HDF5 stores them."""
     import h5py
 
     text = layout.meta_text(meta)
-    file.attrs.update(format=layout.FORMAT, format_version=layout.VERSION, complete=complete, NX_class="NXroot")
+    file.attrs.update(format=layout.FORMAT, format_version=layout.VERSION, complete=True, NX_class="NXroot")
     # Of variable length: one of fixed length would stop at 64 KiB, about forty channels.
     file.attrs.create("meta", text, dtype=h5py.string_dtype("utf-8"))
     streams = file.create_group("streams")
     streams.attrs["NX_class"] = "NXentry"
     specs = layout.specs_by_name(meta)
     digest = layout.ContentDigest(text)
-    for name, columns in _gathered(_digested(on_host_clock(meta, blocks), digest)):
-        _extend(streams.require_group(name), columns)
+    for name, columns in _gathered(blocks):
+        for part, values in columns.items():
+            digest.add(f"/{name}/{part}", values)
+            _extend(streams.require_group(name), part, values)
     for name in streams:
         for label, column in annotations.get(name, {}).items():
             kept = column if column.dtype.kind == "U" else column.astype(np.int64)
@@ -117,20 +110,19 @@ def _fill(file: Any, meta: RecordingMeta, blocks: Blocks, annotations: Annotatio
     file.attrs["content_sha256"] = digest.hexdigest()
 
 
-def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
-    """Yield blocks and add them to the digest, with quality from the first block of a stream on that has quality."""
+def _completed(blocks: Blocks, times: dict[str, IntArray], flagged: set[str]) -> Iterator[tuple[str, Columns]]:
+    """Yield `blocks` with `times` on the host's clock, by stream, and with quality in every block of `flagged` streams.
+
+    Beside times on the host's clock, ``host_ns`` are the times of receipt.
+    """
     rows: Counter[str] = Counter()
-    flagged = set()
     for stream, columns in blocks:
-        good = np.zeros_like(columns["data"], dtype=np.uint8)
-        if "quality" in columns and stream not in flagged:  # all rows before it are good
-            flagged.add(stream)
-            digest.add(f"/{stream}/quality", np.zeros((rows[stream], *good.shape[1:]), dtype=np.uint8))
+        first, count = rows[stream], len(columns["data"])
+        rows[stream] += count
+        if stream in times:
+            columns = {**columns, "host_ns": columns["t_ns"], "t_ns": times[stream][first : first + count]}
         if stream in flagged:
-            columns = {"quality": good, **columns}
-        rows[stream] += len(good)
-        for name, values in columns.items():
-            digest.add(f"/{stream}/{name}", values)
+            columns = {"quality": np.zeros_like(columns["data"], dtype=np.uint8), **columns}
         yield stream, columns
 
 
@@ -146,35 +138,24 @@ def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
             yield stream, {name: values[:whole] for name, values in joined.items()}
             waiting[stream] = [{name: values[whole:] for name, values in joined.items()}]
             rows[stream] -= whole
-    for stream, some in waiting.items():
-        yield stream, _joined(some)
+    yield from ((stream, _joined(some)) for stream, some in waiting.items())
 
 
 def _joined(blocks: list[Columns]) -> Columns:
-    """Return several blocks joined to one; rows before the first block with quality get the quality good."""
-    if "quality" in blocks[-1]:
-        blocks = [{"quality": np.zeros_like(block["data"], dtype=np.uint8)} | block for block in blocks]
-    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[-1]}
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
-def _extend(group: Any, columns: Columns) -> None:
-    start = group["data"].shape[0] if "data" in group else 0
-    stop = start + len(columns["data"])
-    for name, values in columns.items():
-        if name in group:
-            group[name].resize(stop, axis=0)
-            group[name][start:stop] = values
-        else:
-            _create(group, name, values, start)
-
-
-def _create(group: Any, name: str, values: Array, start: int = 0) -> Any:
-    """Return a new column with `values` from row `start` on; rows before are 0, as a quality: good samples."""
-    rest = values.shape[1:]
-    column = group.create_dataset(
-        name, shape=(start + len(values), *rest), maxshape=(None, *rest), dtype=values.dtype, compression="gzip",
-        compression_opts=4, shuffle=True, fillvalue=0, chunks=(layout.CHUNK_ROWS, *rest),
-    )  # fmt: skip
+def _extend(group: Any, name: str, values: Array) -> Any:
+    """Append `values` to a column, which is created at its first values, and return the column."""
+    if name not in group:
+        rest = values.shape[1:]
+        group.create_dataset(
+            name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, compression="gzip",
+            compression_opts=4, shuffle=True, fillvalue=0, chunks=(layout.CHUNK_ROWS, *rest),
+        )  # fmt: skip
+    column = group[name]
+    start = column.shape[0]
+    column.resize(start + len(values), axis=0)
     column[start:] = values
     return column
 
@@ -209,7 +190,7 @@ def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> Non
 
     rows = columns.get("t_ns")
     if rows is None:
-        rows = _create(group, layout.ROWS, np.arange(len(columns["data"]), dtype=np.int64))
+        rows = _extend(group, layout.ROWS, np.arange(len(columns["data"]), dtype=np.int64))
     channels = group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
     channels.make_scale(layout.CHANNELS)
     rows.make_scale("t_ns" if "t_ns" in columns else layout.ROWS)

@@ -93,7 +93,8 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
     x, f = _leading(sensor_s, sensor, edges), _leading(force_s, force, edges)
     best: tuple[float, FloatArray, FloatArray] | None = None
     curve = past = np.empty((0, 0))
-    for lag, drift in _starts(x, f):
+    for start in _starts(x, f):
+        lag, drift = start
         reach = int(0.35 * abs(lag) + abs(drift)) + 3
         if abs(lag) + reach > len(x) / 3:
             continue
@@ -101,13 +102,11 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
             curve = _curve(f)
             past = np.hstack([curve, _past(f, step)])
         shifts = min(0, int(lag) - reach), max(0, int(lag) + reach)
-        full, plain = _Explained(x, past, *shifts), _Explained(x, curve, *shifts)
-        other, plain_left, _ = plain.nearest(lag, drift)
-        found, left, error = full.nearest(*other)
-        unshifted = full.residual(0.0, 0.0)
+        other, _, plain_left, plain_unshifted = _nearest(x, curve, shifts, np.array(start))
+        found, error, left, unshifted = _nearest(x, past, shifts, other)
         noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
         needed = _neighbours(unshifted) > NEEDED * (max(_neighbours(left), 0.0) + noise)
-        suspected = _squares(plain.residual(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
+        suspected = _squares(plain_unshifted) > SUSPECTED * _squares(plain_left)
         if needed and suspected and 2 * abs(found[1]) < FASTEST_DRIFT * len(x):
             share = _squares(left) / len(left)
             if best is None or share < best[0]:
@@ -127,40 +126,39 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
     return late if any(significant(*place) for place in places) else None
 
 
-class _Explained:
-    """Least-squares fit of columns to `x` shifted by a lag, over the rows that exist for every lag in a range."""
+def _nearest(
+    x: FloatArray, columns: FloatArray, shifts: tuple[int, int], start: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Fit columns to `x` shifted by a lag, over the rows that exist for every lag in the range `shifts`.
 
-    def __init__(self, x: FloatArray, columns: FloatArray, lowest: int, highest: int) -> None:
-        self._rows = np.arange(-lowest, len(x) - highest)
-        self._all = np.arange(len(x))
-        self._place = 2 * self._rows / len(x) - 1
-        self._x, self._slope = x, np.gradient(x)
-        self._base = np.linalg.qr(columns[self._rows])[0]
+    Return the best lag in the middle and its change from there to the end [rows] near `start`, (2,), their covariance,
+    (2, 2), the residual, and the residual without a lag.
+    """
+    every = np.arange(len(x))
+    rows = np.arange(-shifts[0], len(x) - shifts[1])
+    place, slope = 2 * rows / len(x) - 1, np.gradient(x)
+    base = np.linalg.qr(columns[rows])[0]
 
-    def _unexplained(self, values: FloatArray) -> FloatArray:
-        return values - self._base @ (self._base.T @ values)
+    def unexplained(values: FloatArray) -> FloatArray:
+        return values - base @ (base.T @ values)
 
-    def residual(self, lag: float, drift: float) -> FloatArray:
-        """Return the residual of `x`, taken `lag` rows later in the middle and `drift` rows more at the end."""
-        return self._unexplained(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
+    def shifted(values: FloatArray, at: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(rows + at[0] + at[1] * place, every, values))
 
-    def nearest(self, lag: float, drift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the best lag and drift near the given ones, (2,), the residual, and their covariance, (2, 2)."""
-        at, before, left = np.array([lag, drift]), np.zeros(2), self.residual(lag, drift)
-        slopes = np.empty((len(left), 2))
-        best = np.inf
-        for _ in range(_ITERATIONS):
-            new = self.residual(*at)
-            if _squares(new) >= best:
-                at = (at + before) / 2
-                continue
-            best, before, left = _squares(new), at, new
-            slope = np.interp(self._rows + at[0] + at[1] * self._place, self._all, self._slope)
-            slopes = np.column_stack([self._unexplained(slope), self._unexplained(slope * self._place)])
-            at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
-        block = np.arange(len(left)) * _BLOCKS // len(left)
-        moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])
-        return before, left, (_BLOCKS - 1) * np.cov(moved.T, bias=True)
+    at, before, best = start, np.zeros(2), np.inf
+    left = slopes = np.empty((0, 2))
+    for _ in range(_ITERATIONS):
+        new = unexplained(shifted(x, at))
+        if _squares(new) >= best:
+            at = (at + before) / 2
+            continue
+        best, before, left = _squares(new), at, new
+        steeper = shifted(slope, at)
+        slopes = np.column_stack([unexplained(steeper), unexplained(steeper * place)])
+        at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
+    block = np.arange(len(left)) * _BLOCKS // len(left)
+    moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])
+    return before, (_BLOCKS - 1) * np.cov(moved.T, bias=True), left, unexplained(shifted(x, np.zeros(2)))
 
 
 def _squares(left: FloatArray) -> float:
@@ -202,7 +200,7 @@ def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
 def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
     """Return the shortest of the best lags up to `most` rows, and the factor by which it reduces squared residuals.
 
-    If the force repeats itself, several lags are equally good.
+    If the force repeats itself, several lags are equally good. The factor is 0 if the search ends at `most` rows.
     """
     curve = _curve(f)[:, 2:]
     base = np.linalg.qr(curve - curve.mean(axis=0))[0]
@@ -215,9 +213,8 @@ def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
     place = int(good[np.argmin(abs(lags[good]))])
     while 0 < place < 2 * most and min(left[place - 1], left[place + 1]) < left[place]:
         place += -1 if left[place - 1] < left[place + 1] else 1
-    if place in (0, most, 2 * most):
-        return 0, 0.0
-    return int(lags[place]), float(left[most] / max(left[place], 1e-12))
+    inside = 0 < place < 2 * most
+    return int(lags[place]), inside * float(left[most] / max(left[place], 1e-12))
 
 
 def _curve(f: FloatArray) -> FloatArray:

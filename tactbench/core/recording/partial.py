@@ -21,27 +21,17 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tactbench.core.errors import FormatError, MissingRecordingError
+from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
 from tactbench.core.files import try_lock
 from tactbench.core.recording import image
-from tactbench.core.recording.clock_fit import with_clock_fits
-from tactbench.core.recording.format import (
-    PARTIAL,
-    Array,
-    Blocks,
-    Columns,
-    canonical,
-    completing_path,
-    meta_text,
-    readable,
-)
-from tactbench.core.recording.reader import Recording, parse_meta
+from tactbench.core.recording.format import PARTIAL, Array, Columns, canonical, completing_path, readable
+from tactbench.core.recording.reader import parse_meta
 from tactbench.core.spec.recording import RecordingMeta
 
 MAGIC = b"tactbench-partial 2\n"
@@ -114,59 +104,36 @@ class Partial:
 
 
 @dataclass(frozen=True)
-class _Journal:
-    """Content of a journal at the time of reading; the file may have grown since."""
+class JournalBlocks:
+    """The blocks of a journal, as the name of the stream and the columns of each; they can be iterated repeatedly.
+
+    An iteration raises FormatError for an invalid block, and RecordingError if there are fewer rows than expected.
+    """
 
     path: Path
-    meta: RecordingMeta
-    """The meta with all changes written so far."""
-    end: int
-    """Length of the file up to the end of its last complete frame [bytes]."""
+    end: int | None = None
+    """Length of the part of the file that is read [bytes]; None: the whole file."""
+    expected: Mapping[str, int] = field(default_factory=dict)
+    """Number of rows that were written, by stream."""
 
-    def blocks(self) -> Blocks:
-        """Yield the name of the stream and the columns of each block."""
-        return read_blocks(self.path, self.end)
-
-    def fitted(self, **changes: Any) -> RecordingMeta:
-        """Return the meta with `changes` applied, and with clock fits and row counts computed from the blocks."""
-        rows: Counter[str] = Counter()
-
-        def counted() -> Blocks:
-            for stream, columns in self.blocks():
-                rows[stream] += len(columns["data"])
+    def __iter__(self) -> Iterator[tuple[str, Columns]]:
+        left = dict(self.expected)
+        frames = _frames(self.path, self.path.stat().st_size if self.end is None else self.end)
+        next(frames, None)
+        for head, body, _ in frames:
+            if not head.startswith(b"{"):
+                with readable(self.path):
+                    stream, columns = _block(json.loads(head), body)
+                left[stream] = left.get(stream, 0) - len(columns["data"])
                 yield stream, columns
-
-        fitted = with_clock_fits(self.meta.model_copy(update=changes), counted())
-        streams = {name: counts.model_copy(update={"written": rows[name]}) for name, counts in fitted.streams.items()}
-        return fitted.model_copy(update={"streams": streams})
-
-
-def salvage(path: Path) -> Recording:
-    """Open an unfinished recording (``….partial``) for reading, with every block written so far.
-
-    The file may still grow: the opened recording has the blocks present at this moment.
-
-    Raises
-    ------
-    MissingRecordingError
-        If there is no such file.
-    FormatError
-        If the file is not an unfinished recording.
-    """
-    import h5py
-
-    journal = _read(path)
-    meta = journal.fitted()
-    file = image.build(meta, journal.blocks(), {}, complete=False)
-    recording = Recording(path, h5py.File(h5py.h5f.open_file_image(file)), meta_text(meta), complete=False)
-    recording.verify()
-    return recording
+        if any(count > 0 for count in left.values()):
+            raise RecordingError(f"{self.path} has lost rows, by stream: {left}.", hint="Check the disk.")
 
 
 def rescue(path: Path, target: Path) -> None:
     """Convert an unfinished recording into a finished one at `target`, excluded from evaluations as interrupted.
 
-    The file of the unfinished recording is kept.
+    The file of the unfinished recording is kept; it may still grow: the blocks present at this moment are converted.
 
     Raises
     ------
@@ -178,41 +145,33 @@ def rescue(path: Path, target: Path) -> None:
         If `target` exists, or cannot be written.
     """
     image.require_free(target)
-    journal = _read(path)
-    excluded = journal.meta.excluded or "interrupted: it broke off, and was rescued"
-    meta = journal.fitted(remarks=(*journal.meta.remarks, REMARK), excluded=excluded)
-    image.store(target, meta, journal.blocks(), {}, aside=completing_path(target))
+    meta, end = _read(path)
+    blocks, rows = JournalBlocks(path, end), Counter[str]()
+    for stream, columns in blocks:
+        rows[stream] += len(columns["data"])
+    meta = meta.model_copy(update={
+        "remarks": (*meta.remarks, REMARK),
+        "excluded": meta.excluded or "interrupted: it broke off, and was rescued",
+        "streams": {name: one.model_copy(update={"written": rows[name]}) for name, one in meta.streams.items()},
+    })  # fmt: skip
+    image.store(target, meta, blocks, {}, aside=completing_path(target))
 
 
-def _read(path: Path) -> _Journal:
-    """Return the content of a journal up to its last complete frame; raises the errors of :func:`salvage`."""
+def _read(path: Path) -> tuple[RecordingMeta, int]:
+    """Return the meta in a journal, with all changes written so far, and the end of its last complete frame [bytes]."""
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     frames = _frames(path, path.stat().st_size)
     text, _, end = next(frames, (b"", b"", 0))
     if not end:
-        raise FormatError(
-            f"{path} is not an unfinished recording, or has no complete frame.",
-            hint="Read a finished recording without `--salvage`.",
-        )
+        raise FormatError(f"{path} is not an unfinished recording, or has no complete frame.", hint="Check the path.")
     with readable(path):
         content = json.loads(text)
         for head, _, place in frames:
             end, frame = place, json.loads(head)
             if "meta" in frame:
                 content.update(frame["meta"])
-        return _Journal(path, parse_meta(path, canonical(content)), end)
-
-
-def read_blocks(path: Path, end: int | None = None) -> Blocks:
-    """Yield the blocks in the first `end` bytes of a journal; raises FormatError for an invalid block."""
-    frames = _frames(path, path.stat().st_size if end is None else end)
-    next(frames, None)
-    for head, body, _ in frames:
-        if not head.startswith(b"{"):
-            with readable(path):
-                block = _block(json.loads(head), body)
-            yield block
+        return parse_meta(path, canonical(content)), end
 
 
 def _frame(head: bytes, body: bytes) -> bytes:

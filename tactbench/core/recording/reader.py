@@ -88,18 +88,15 @@ class Recording:
         Path of the file.
     meta
         Description of the recording.
-    complete
-        False for an unfinished recording, as a crash leaves it.
     version
         Version of the file's format.
     stream_names
         Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
 
-    def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
+    def __init__(self, path: Path, file: Any, text: str) -> None:
         self.path = path
         self.meta = parse_meta(path, text)
-        self.complete = complete
         self.version = int(file.attrs["format_version"])
         self._text = text
         self._file = file
@@ -192,11 +189,11 @@ def open_recording(path: Path) -> Recording:
     except (OSError, RuntimeError, ValueError) as error:
         raise FormatError(
             f"{path} cannot be read, is not an HDF5 file, or was cut short: {error}.",
-            hint="Check its permissions, or get it again; read `….partial` files, left by a crash, with `--salvage`.",
+            hint="Check its permissions, or get it again; convert files `….partial`, left by a crash, with `--rescue`.",
         ) from error
     try:
         with layout.readable(path):
-            return Recording(path, file, _envelope(path, file), complete=True)
+            return Recording(path, file, _envelope(path, file))
     except BaseException:
         file.close()
         raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,8 @@ from tactbench.core.errors import RecordingError, RigError, TactbenchError, comp
 from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
-from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.format import Annotations, Array, Columns
-from tactbench.core.recording.partial import Partial, read_blocks
+from tactbench.core.recording.partial import JournalBlocks, Partial
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -37,27 +36,24 @@ class RecordingWriter:
         Path of the finished recording.
     meta
         Description of the recording; :meth:`revise` changes it until the end.
-    replace
-        True: an existing file is replaced, but only when the new recording is complete.
 
     Raises
     ------
     RecordingError
-        If the file exists and `replace` is False, or the disk refuses to write.
+        If the file exists, or the disk refuses to write.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta) -> None:
         self.path = path
         self.meta = meta
-        self._replace = replace
         self._specs = layout.specs_by_name(meta)
         self._complete = False
         self._optional: dict[str, tuple[bool, bool]] = {}
+        """Whether the blocks of a stream have sequence numbers, and device times."""
         self._partial: Partial
 
     def __enter__(self) -> RecordingWriter:
-        if not self._replace:
-            image.require_free(self.path)
+        image.require_free(self.path)
         with writable(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._partial = Partial(self.path, layout.meta_text(self.meta))
@@ -91,24 +87,10 @@ class RecordingWriter:
         RecordingError
             If the disk refuses to write; the journal is then kept, as after a crash.
         """
-        journal = self._partial
-        if any(timed for _, timed in self._optional.values()):
-            self.meta = with_clock_fits(self.meta, self._blocks(journal))
-        aside = layout.completing_path(journal.path)
-        blocks = self._blocks(journal)
-        image.store(self.path, self.meta, blocks, {}, aside=aside, replace=self._replace, sync=self._unique)
+        journal, aside = self._partial, layout.completing_path(self._partial.path)
+        blocks = JournalBlocks(journal.path, None, journal.rows)
+        self.meta = image.store(self.path, self.meta, blocks, {}, aside=aside, sync=self._unique)
         self._complete = True
-
-    def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
-        """Yield the blocks of the journal; raises RecordingError if the journal lacks rows that were written to it."""
-        left = dict(journal.rows)
-        for stream, columns in read_blocks(journal.path):
-            left[stream] -= len(columns["data"])
-            yield stream, columns
-        if any(count > 0 for count in left.values()):
-            raise RecordingError(
-                f"The journal of {self.path} has lost rows, by stream: {left}.", hint="Check the disk."
-            )
 
     def _leave(self, error: BaseException | None) -> None:
         """Close the journal, and remove it unless it has the only copy of rows that cannot be recorded again."""
@@ -191,9 +173,6 @@ def write_recording(
     """
     specs = layout.specs_by_name(meta)
     stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
-    meta = with_clock_fits(meta, stored)
-    if not replace:
-        image.require_free(path)
     aside = layout.completing_path(path)
     image.store(path, meta, stored, annotations, aside=aside, replace=replace, sync=False)
 

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +23,6 @@ from tactbench.core.report.cells import details
 from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.classification import confusion, embedding
 from tactbench.core.report.figures.group import Group, Sketch, groups
-from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.figures.published_and_ours import draw_published
 from tactbench.core.report.figures.regression import prediction_against_time, residuals
 from tactbench.core.report.figures.style import save, styled
 from tactbench.core.report.figures.trade import trade_table
@@ -39,26 +36,27 @@ TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 
 def answers_section(results: Results) -> Section:
-    """Return the first section: the outcome of each leaderboard, and a figure of published scores and ours."""
+    """Return the first section: the outcome of each leaderboard, and the count of published scores in our intervals."""
     verdicts = [
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
         for one in results.leaderboard.blocks
         if one.verdict
     ]
-    published = [line.verdict for line in reproduce(results.registry, results.rows)]
-    inside, judged = published.count("inside"), sum(verdict in ("inside", "outside") for verdict in published)
-    counts = [f"Published numbers in the interval of ours: {inside} of {judged}."] if judged else []
+    published = Counter(line.verdict for line in reproduce(results.registry, results.rows))
+    judged = published["inside"] + published["outside"]
+    counts = [f"Published numbers in the interval of ours: {published['inside']} of {judged}."] if judged else []
     simulated = ["SIM: simulated by a twin of the sensor; no sensor was touched."]
     simulated = simulated if any(row["simulated"] for row in results.rows) else []
-    pictures = tuple(one for one in results.drawn if one.name == PUBLISHED)
-    return Section(paragraphs=(*simulated, *counts, *verdicts), pictures=pictures)
+    return Section(paragraphs=(*simulated, *counts, *verdicts))
 
 
 def leaderboards_section(results: Results) -> Section:
-    """Return the section of leaderboards, with the reasons of failed and skipped cells."""
+    """Return the section of leaderboards, with the reasons of failed and skipped cells, and of tables on events."""
     view = View(columns=(*DEFAULT, REASON))
-    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in results.leaderboard.blocks)
-    return Section(paragraphs=("A number leads to the details of its cell.",), tables=tables)
+    tables = [replace(grid(block, view), numeric=NUMERIC) for block in results.leaderboard.blocks]
+    tables += results.leaderboard.sections
+    return Section(paragraphs=("A number leads to the details of its cell.",),
+                   tables=tuple(table.compact() for table in tables))  # fmt: skip
 
 
 def published_section(results: Results) -> Section:
@@ -68,15 +66,9 @@ def published_section(results: Results) -> Section:
 
 
 def figures_section(results: Results) -> Section:
-    """Return the section of figures, except for the figure of published scores in the first section."""
-    pictures = tuple(one for one in results.drawn if one.name != PUBLISHED)
-    paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
-    return Section(paragraphs=paragraphs, pictures=pictures, missing=results.undrawn)
-
-
-def compared_section(results: Results) -> Section:
-    """Return the section of tables on events and leakage probes."""
-    return Section(tables=tuple(table.compact() for table in results.leaderboard.sections))
+    """Return the section of figures."""
+    paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",)
+    return Section(paragraphs=paragraphs * bool(results.drawn), pictures=results.drawn, missing=results.undrawn)
 
 
 def costs_section(results: Results) -> Section:
@@ -102,16 +94,13 @@ def sensors_section(results: Results) -> Section:
     known = results.registry.sensors
     names = list(dict.fromkeys(str(row["sensor"]) for row in results.rows))
     missing = tuple(f"{name}: not installed." for name in names if name not in known)
-    names = [name for name in names if name in known]
-    if not names:
+    specs = [known[name].spec for name in names if name in known]
+    if not specs:
         return Section(missing=missing)
-    specs = [known[name].spec for name in names]
-    table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
-    command = command_line("tactbench", "show", *names, "--all")
-    return Section(
-        paragraphs=(f"All parameters of these sensors with their sources: `{command}`.",), tables=(table,),
-        missing=missing,
-    )  # fmt: skip
+    table = sensor_table("Sensor comparison", specs, table_one, with_source=True).compact()
+    command = command_line("tactbench", "show", *(spec.name for spec in specs), "--all")
+    paragraph = f"All parameters of these sensors with their sources: `{command}`."
+    return Section(paragraphs=(paragraph,), tables=(table,), missing=missing)
 
 
 def cells_section(results: Results) -> Section:
@@ -137,7 +126,6 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("leaderboards", "Leaderboard", leaderboards_section),
     ("reproduction", "Published numbers", published_section),
     ("figures", "Figures", figures_section),
-    ("compared", "Events and probes", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("assumptions", "What simulated scores rest on", assumptions_section),
     ("sensors", "Sensors (the paper's Table I)", sensors_section),
@@ -165,25 +153,23 @@ def draw_figures(
     Returns
     -------
     list of SavedFigure
-        Figures in the order of the report: published scores and ours, then by group of comparable cells.
+        Figures by group of comparable cells.
     """
-    work: list[tuple[str, Callable[[], Sketch | None]]] = []
+    work: list[tuple[Callable[[Group], Sketch], Group]] = []
     for group in groups(results, remark):
         kind = "vector" if isinstance(group.task.target, VectorTarget) else group.task.kind
-        where = f"of {group.task.name} under {group.row['protocol']}, split {group.row['split']}"
-        work += [(f"{draw.__name__.replace('_', ' ')} {where}", partial(draw, group)) for draw in FIGURES.get(kind, ())]
-    if work:
-        work.insert(0, ("picture of published scores and ours", partial(draw_published, results)))
+        work += [(draw, group) for draw in FIGURES.get(kind, ())]
     drawn: list[SavedFigure] = []
     progress.begin("drawing", len(work))
     with styled():
-        for name, draw in work:
+        for draw, group in work:
+            name = draw.__name__.replace("_", " ")
+            name += f" of {group.task.name} under {group.row['protocol']}, split {group.row['split']}"
             progress.working(name)
             try:
-                sketch = draw()
-                if sketch is not None:
-                    picture = save(sketch.figure, folder / sketch.name)
-                    drawn.append(SavedFigure(sketch.name, sketch.title, sketch.caption, picture))
+                sketch = draw(group)
+                picture = save(sketch.figure, folder / sketch.name)
+                drawn.append(SavedFigure(sketch.name, sketch.title, sketch.caption, picture))
             except Exception as error:  # stops no other figure
                 remark(f"No {name}: {error_text(error)}")
             progress.advance(name)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
+from tactbench.core.leaderboard.names import grouped
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.replicates import against_reference
@@ -17,17 +17,12 @@ Verdict = Literal["inside", "outside", "no interval", "no answer"]
 COLUMNS = ("number", "published", "ours", "interval", "ours − published", "verdict")
 
 
-@dataclass(frozen=True)
-class Reproduction:
+class Reproduction(NamedTuple):
     """A published score, and a comparable row of our results."""
 
     task: TaskSpec
     published: Published
     row: Row
-    verdict: Verdict
-    """`inside`: the published score lies in the interval of ours; `no interval`: too few replicates for an interval."""
-    reason: str = ""
-    """Reason why our row has no score; empty if it has a score."""
 
     @property
     def title(self) -> str:
@@ -36,13 +31,23 @@ class Reproduction:
         ours = [str(self.row[key]) for key in ("sensor", "estimator") if getattr(self.published, key) is None]
         return f"{title} ({', '.join(ours)})" if ours else title
 
+    @property
+    def verdict(self) -> Verdict:
+        """`inside` if the published score lies in our interval; `no interval`: too few replicates for an interval."""
+        if self.row["status"] != "done":
+            return "no answer"
+        low, high = self.row["ci_low"], self.row["ci_high"]
+        if low is None:
+            return "no interval"
+        return "inside" if low <= self.published.score and (high is None or self.published.score <= high) else "outside"
+
 
 def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
     """Return one comparison for each published score and comparable row, tasks in the order of the rows."""
     rows = list(map(against_reference, rows))
     tasks = [registry.tasks[name].spec for name in dict.fromkeys(row["task"] for row in rows) if name in registry.tasks]
     return [
-        Reproduction(task, published, row, *_verdict(row, published.score))
+        Reproduction(task, published, row)
         for task in tasks
         for published in task.published
         for row in rows
@@ -57,30 +62,14 @@ def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
 
 
-def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
-    if row["status"] != "done":
-        return "no answer", f"{row['status']}: {row['reason']}"
-    low, high = row["ci_low"], row["ci_high"]
-    if low is None:
-        return "no interval", ""
-    return "inside" if low <= published and (high is None or published <= high) else "outside", ""
-
-
 def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
     """Return the table of published scores, ours, and their differences."""
     lines = reproduce(registry, rows)
-    titles: dict[str, dict[str, None]] = {}
-    for line in lines:
-        if line.published.remark:
-            titles.setdefault(line.published.remark, {})[line.published.title or line.title] = None
-    return text_table(
-        "Published numbers, and ours",
-        COLUMNS,
-        list(map(_entries, lines)),
-        numeric=COLUMNS[1:5],
-        notes=[f"{', '.join(whose)}: {remark}." for remark, whose in titles.items()],
-        kinds=[line.verdict.replace(" ", "-") for line in lines],
-    )
+    stated = grouped((line.published for line in lines if line.published.remark), lambda one: one.remark)
+    notes = [f"{', '.join(dict.fromkeys(one.title for one in own))}: {remark}." for remark, own in stated.items()]
+    kinds = [line.verdict.replace(" ", "-") for line in lines]
+    entries = list(map(_entries, lines))
+    return text_table("Published numbers, and ours", COLUMNS, entries, numeric=COLUMNS[1:5], notes=notes, kinds=kinds)
 
 
 def _entries(line: Reproduction) -> tuple[str, ...]:
@@ -88,7 +77,7 @@ def _entries(line: Reproduction) -> tuple[str, ...]:
     title = f"{line.title}; {line.published.reference}"
     theirs = Entry(f"{published:g}" if unit == "1" else score(published, unit), published)
     if row["score"] is None:
-        return (title, theirs, ABSENT, ABSENT, ABSENT, line.reason)
+        return (title, theirs, ABSENT, ABSENT, ABSENT, f"{row['status']}: {row['reason']}")
     marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
     return (
         title,

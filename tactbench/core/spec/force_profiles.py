@@ -1,4 +1,4 @@
-"""Named force profiles: a staircase, a held press and a sine. Forces are in N, times in s and rates in Hz."""
+"""Named force profiles: a staircase and a sine. Forces are in N, times in s and rates in Hz."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ def staircase(
 ) -> ForcePath:
     """Return a path of equal steps up to a peak force and down again, as for a calibration curve with hysteresis.
 
+    One step is a press that is held and released, which shows creep and recovery.
+
     Parameters
     ----------
     peak, steps
@@ -36,32 +38,6 @@ def staircase(
     count = _whole("staircase", "steps", steps)
     levels = [peak * level / count for level in (*range(1, count + 1), *range(count - 1, -1, -1))]
     return _path("staircase", rate, (hold, 0.0), *((span, level) for level in levels for span in (rise, dwell)))
-
-
-def press_hold_release(
-    *,
-    peak: float = 5.0,
-    rise: float = 1.0,
-    dwell: float = 10.0,
-    release: float = 1.0,
-    rest: float = 10.0,
-    hold: float = 3.0,
-    rate: float = 100.0,
-) -> ForcePath:
-    """Return a path with one press that is held and then released, which shows creep and recovery.
-
-    Parameters
-    ----------
-    peak
-        Force that is held [N].
-    rise, dwell, release
-        Times of pressing (above 0), of holding the force, and of releasing (above 0) [s].
-    rest, hold
-        Durations of the unloaded end (`rest`) and start (`hold`) of the path [s].
-    rate
-        Rate of the reference clock [Hz].
-    """
-    return _path("press-hold-release", rate, (hold, 0.0), (rise, peak), (dwell, peak), (release, 0.0), (rest, 0.0))
 
 
 def sine(

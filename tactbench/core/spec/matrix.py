@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.spec.quantity import Frozen
@@ -52,24 +52,6 @@ class TaskChoice(Frozen):
     """Name or mapping file of a public data set to use for this task instead of the matrix's recordings."""
 
 
-class ComparisonChoice(Frozen):
-    """A planned comparison of two sensors or two estimators."""
-
-    sensors: tuple[str, str] | None = None
-    estimators: tuple[str, str] | None = None
-    task: str | None = None
-    """Name of the task of the comparison; None: every task with results of both."""
-
-    @model_validator(mode="after")
-    def _one_kind_of_two(self) -> ComparisonChoice:
-        pair = self.sensors or self.estimators
-        if pair is None or (self.sensors and self.estimators):
-            raise ValueError("a comparison needs either `sensors` or `estimators`, two names of one of them")
-        if pair[0] == pair[1]:
-            raise ValueError(f"{pair[0]!r} is given twice, and two different names are expected")
-        return self
-
-
 class MatrixSpec(Frozen):
     """The benchmark matrix: every sensor with every task, and the settings of the run."""
 
@@ -99,5 +81,3 @@ class MatrixSpec(Frozen):
     sensors: tuple[str, ...] = ()
     """Names of sensors; empty: all sensors of which the rig has recordings."""
     tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)
-    comparisons: tuple[ComparisonChoice, ...] = ()
-    """Comparisons planned in advance; their p-values are corrected for their number."""

@@ -6,13 +6,10 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import Any
 
 from tactbench.core.progress import Progress
 from tactbench.core.tables.terminal import remark
-
-_FEW = 10
-"""Largest number of steps of a stage that shows no remaining time, since single steps differ by orders of magnitude."""
 
 
 @contextmanager
@@ -21,13 +18,22 @@ def progress() -> Iterator[Progress]:
     if not sys.stderr.isatty():
         yield _Lines()
         return
-    # A cell in this process prints to its log: what is shown meanwhile needs a way of its own to the terminal.
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as RichProgress
+
+    # A cell in this process prints to its log: what is shown meanwhile needs a way of its own to the terminal, and rich
+    # must not take over the streams.
     with os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace") as terminal:
-        bar = _Bar(terminal)
+        shown = RichProgress(
+            TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+            TimeRemainingColumn(), TextColumn("{task.fields[now]}", markup=False), console=Console(file=terminal),
+            redirect_stdout=False, redirect_stderr=False, transient=True,
+        )  # fmt: skip
         try:
-            yield bar
+            yield _Bar(shown)
         finally:
-            bar.end()
+            shown.stop()
 
 
 class _Lines(Progress):
@@ -48,40 +54,20 @@ class _Lines(Progress):
 class _Bar(Progress):
     """Progress on a terminal: a progress bar for each stage."""
 
-    def __init__(self, terminal: TextIO) -> None:
-        self._terminal = terminal
-        self._shown: Any = None
-        self._task: Any = None
-        self._stopped = 0
+    def __init__(self, shown: Any) -> None:
+        self._shown = shown
 
     def begin(self, stage: str, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-        from rich.progress import Progress as RichProgress
-
-        self.end()
-        columns = (
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[stopped]}", markup=False, style="red"),
-            TimeElapsedColumn(),
-            *([TimeRemainingColumn()] if total > _FEW else []),
-            TextColumn("{task.fields[now]}", markup=False),
-        )
-        # The terminal is handed over as it is: rich must not take over streams that cells print to.
-        self._shown = RichProgress(
-            *columns, console=Console(file=self._terminal), redirect_stdout=False,
-            redirect_stderr=False, transient=True,
-        )  # fmt: skip
+        for task in self._shown.task_ids:
+            self._shown.remove_task(task)
         self._stopped = 0
-        self._task = self._shown.add_task(f"{stage}", total=total, now="", stopped="")
+        self._task = self._shown.add_task(stage, total=total, now="")
         self._shown.start()
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
         self._stopped += stopped
-        text = f"{self._stopped} stopped" if self._stopped else ""
-        self._shown.update(self._task, advance=1, now=what, stopped=text, refresh=True)
+        ended = f"({self._stopped} stopped) " if self._stopped else ""
+        self._shown.update(self._task, advance=1, now=f"{ended}{what}", refresh=True)
 
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)
@@ -89,16 +75,8 @@ class _Bar(Progress):
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Return a context in which the progress bar is hidden."""
-        shown = self._shown
-        if shown is not None:
-            shown.stop()
+        self._shown.stop()
         try:
             yield
         finally:
-            if shown is not None:
-                shown.start()
-
-    def end(self) -> None:
-        if self._shown is not None:
-            self._shown.stop()
-            self._shown = None
+            self._shown.start()

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.leaderboard.names import grouped
 from tactbench.core.leaderboard.sensitivity import FOLDER, ends_of, name_of, ranges_of, sensitivities
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.store import Row, Store
@@ -42,15 +41,14 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
 
         def run(ends: Mapping[str, str]) -> None:
             remark(f"{name_of(ends)}:")
-            values = {
-                sensor: {one[0]: singles[one][sensor] for one in ends.items() if sensor in singles[one]}
-                for sensor in matrix.sensors
-            }
             folder = Store(study.out / FOLDER / name_of(ends))
-            for own, sensors in grouped(filter(values.get, values), lambda one: tuple(values[one].items())).items():
-                nuisances = tuple(sorted({**dict(matrix.simulation.nuisances), **dict(own)}.items()))
+            for sensor in matrix.sensors:
+                own = {one[0]: singles[one][sensor] for one in ends.items() if sensor in singles[one]}
+                if not own:
+                    continue
+                nuisances = tuple(sorted({**dict(matrix.simulation.nuisances), **own}.items()))
                 simulation = matrix.simulation.model_copy(update={"nuisances": nuisances})
-                part = untimed.model_copy(update={"sensors": tuple(sensors), "simulation": simulation})
+                part = untimed.model_copy(update={"sensors": (sensor,), "simulation": simulation})
                 stopped.extend(run_matrix(part, folder, choice=choice, progress=display).failures)
 
         for one in singles:

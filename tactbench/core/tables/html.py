@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
+from collections.abc import Iterable
 
 from tactbench.core.tables.text_table import TextTable
+
+_TEMPLATE = """\
+{% for table in tables %}
+<p>{{ table.title }} {{ table.origin }}{% for text in table.summary %}<br>{{ text }}{% endfor %}</p>
+<table>
+<thead><tr>{% for name in table.headers %}<th>{{ name }}</th>{% endfor %}</tr></thead>
+<tbody>
+{% for line in table.lines %}
+<tr>{% for text in line %}<td style="text-align: {{ "right" if table.right[loop.index0] else "left" }}">{{ text }}</td>\
+{% endfor %}</tr>
+{% endfor %}
+</tbody>
+</table>
+<p>{% for note in table.notes %}{{ note }}<br>{% endfor %}</p>
+{% endfor %}
+"""
 
 
 def html(tables: Iterable[TextTable]) -> str:
     """Return tables and their notes as HTML without scripts; all texts are escaped."""
-    return "\n".join(map(_table, tables))
+    from jinja2 import Environment
 
-
-def _table(table: TextTable) -> str:
-    def line(texts: Sequence[str], tag: str, kind: str = "") -> str:
-        sides = ("right" if right else "left" for right in table.right)
-        cells = zip(texts, sides, strict=True)
-        found = "".join(f'<{tag} style="text-align: {side}">{escape(text)}</{tag}>' for text, side in cells)
-        return f'<tr style="opacity: {0.6 if kind == "baseline" else 1}">{found}</tr>'
-
-    kinds = table.kinds or [""] * len(table.lines)
-    body = "".join(line(texts, "td", kind) for texts, kind in zip(table.lines, kinds, strict=True))
-    grid = f"<table><thead>{line(table.headers, 'th')}</thead><tbody>{body}</tbody></table>"
-    above = _sentences((f"{table.title} {table.origin}".strip(), *table.summary))
-    return above + grid + _sentences(table.notes)
-
-
-def _sentences(texts: Sequence[str]) -> str:
-    return f"<p>{'<br>'.join(map(escape, texts))}</p>" if texts else ""
+    return Environment(autoescape=True, trim_blocks=True).from_string(_TEMPLATE).render(tables=list(tables))

@@ -1,4 +1,4 @@
-"""Output of tables as LaTeX for pdfLaTeX with the booktabs package; all texts are escaped."""
+"""Output of tables as LaTeX for pdfLaTeX with the packages booktabs and graphicx; all texts are escaped."""
 
 from __future__ import annotations
 
@@ -20,44 +20,34 @@ _TEX = {
 """LaTeX code by character; brackets and the star are in braces, since after ``\\\\`` they would be options."""
 
 
-def latex(tables: Iterable[TextTable]) -> str:
-    """Return tables as LaTeX, as wide as both columns of a paper."""
-    return "\n".join(latex_table(one, number=number) for number, one in enumerate(tables, 1))
+def latex(tables: Iterable[TextTable], wide: bool = True) -> str:
+    """Return tables as LaTeX, at most as wide as one column of a paper, or as both if `wide`."""
+    return "\n".join(_table(one, number, "table*" if wide else "table") for number, one in enumerate(tables, 1))
 
 
-def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: int | None = None) -> str:
-    """Return a table as LaTeX, with its title as the caption; backticks in notes are removed.
+def _table(table: TextTable, number: int, environment: str) -> str:
+    """Return a table as LaTeX, with its title as the caption and a rule above trivial answers.
 
-    A heading may have two lines, separated by a line break.
-
-    Parameters
-    ----------
-    number
-        Number of the table in a file, used at the end of its label.
-    columns
-        Column types of ``tabular`` for a table in one column of a paper; empty: a table as wide as both columns.
-    rule
-        Index of the line above which a horizontal rule is drawn.
+    Backticks in notes are removed. A table that is wider than the text is scaled down.
     """
-    heads = zip(*(head.rpartition("\n")[::2] for head in table.headers), strict=True)
-    environment = "table" if columns else "table*"
-    lines = [" & ".join(map(tex, line)) + r" \\" for line in table.lines]
-    if rule is not None:
-        lines.insert(rule, r"\midrule")
+    lines = [" & ".join(map(tex, line)) + r" \\" for line in (table.headers, *table.lines)]
+    first = table.kinds.index("baseline") if "baseline" in table.kinds else 0
+    for place in sorted({0, first}, reverse=True):
+        lines.insert(place + 1, r"\midrule")
     return "\n".join([
+        "% Packages: booktabs, graphicx.",
         rf"\begin{{{environment}}}[t]",
         r"\centering",
         r"\footnotesize",
         r"\setlength{\tabcolsep}{2.5pt}\setlength{\belowcaptionskip}{4pt}",
         rf"\caption{{{tex(table.title)}}}",
         rf"\label{{{_label(table.title, number)}}}",
-        rf"\begin{{tabular}}{{{columns or ''.join('r' if right else 'l' for right in table.right)}}}",
+        r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
+        rf"\begin{{tabular}}{{{''.join('r' if right else 'l' for right in table.right)}}}",
         r"\toprule",
-        *(" & ".join(map(tex, row)) + r" \\" for row in heads if any(row)),
-        r"\midrule",
         *lines,
         r"\bottomrule",
-        r"\end{tabular}",
+        r"\end{tabular}}",
         *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in table.notes),
         rf"\end{{{environment}}}",
         "",

@@ -38,17 +38,9 @@ def duration(seconds: float | None) -> str:
     """Return a duration as text with three significant digits, in s, ms or µs."""
     if seconds is None:
         return ABSENT
-    if seconds >= 0.9995:
-        value, unit = seconds, "s"
-    elif (value := seconds * 1e3) >= 0.9995:
-        unit = "ms"
-    elif seconds > 0:
-        value, unit = seconds * 1e6, "µs"
-    else:
-        return "0 s"
-    if value >= 99.95:
-        return f"{value:.0f} {unit}"
-    return f"{value:.1f} {unit}" if value >= 9.995 else f"{value:.2f} {unit}"
+    scales = ((value, unit) for value, unit in ((seconds, "s"), (seconds * 1e3, "ms")) if value >= 0.9995)
+    value, unit = next(scales, (seconds * 1e6, "µs") if seconds else (0, "s"))
+    return f"{value:.{0 if value >= 99.95 else 1 if value >= 9.995 else 2}f} {unit}"
 
 
 def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:

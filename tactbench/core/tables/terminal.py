@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from tactbench.core.tables.text import visible_lines
 from tactbench.core.tables.text_table import TextTable
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim", "alarm": "yellow", "inside": "bold"}
 _GAP, _MARGIN = 2, 1
-_LEAST = 4
-"""Smallest width of a column of words [characters]."""
+_LONG_WORD = 12
+"""Number of characters from which a word may be broken."""
 WITHOUT_EDGE = 400
 """Width of a table in a file or a pipe [characters], enough for all columns with names of ordinary length."""
 Part = TextTable | Sequence[str]
@@ -81,41 +81,36 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
     taken = sum(widths.values()) + _GAP * (len(widths) - 1) + _MARGIN
     blank = taken - cell_len(table.title) - cell_len(table.origin)
     origin = (" " * blank if blank > 1 else "\n") + table.origin if table.origin else ""
-    console.print(Text(table.title + origin, "bold"), highlight=False)
-    for sentence in table.summary:
-        console.print(Text(sentence), highlight=False)
-    console.print()
+    sentences = "".join(f"\n{one}" for one in (*table.summary, ""))
+    console.print(Text.assemble((table.title + origin, "bold"), sentences), highlight=False)
     grid = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0), header_style="bold")
     for place, width in widths.items():
-        grid.add_column(
-            Text(table.headers[place]),
-            justify="right" if table.right[place] else "left",
-            vertical="top",
-            width=width,
-            overflow="fold",
-        )
+        justify: Literal["left", "right"] = "right" if table.right[place] else "left"
+        grid.add_column(Text(table.headers[place]), justify=justify, width=width, overflow="fold")
     for line, kind in zip(table.lines, table.kinds or [""] * len(table.lines), strict=True):
         grid.add_row(*(Text(line[place]) for place in widths), style=_STYLE.get(kind, ""))
     console.print(Padding(grid, (0, 0, 0, _MARGIN)), width=max(taken, console.width), crop=False)
     if table.notes:
         console.print()
-    return [table.headers[place] for place in range(len(table.columns)) if place not in widths]
+    return [head for place, head in enumerate(table.headers) if place not in widths]
 
 
 def _widths(table: TextTable, room: int) -> dict[int, int]:
     """Return the widths of the columns that fit into `room` characters, by index of the column.
 
-    Headings and texts are broken at spaces, numbers are not. Columns in `first_to_go` go before a word is cut.
+    Headings and texts are broken at spaces, and long words; numbers are not, and columns in `first_to_go` go first.
     """
     from rich.cells import cell_len
 
     widths, least, body = {}, {}, {}
     for place, (name, head, *texts) in enumerate(zip(table.columns, table.headers, *table.lines, strict=True)):
         lines = [line for text in texts for line in text.split("\n")]
-        kept = lines if name in table.numeric | table.unbroken else " ".join(lines).split()
         body[place] = max(map(cell_len, lines), default=0)
+        whole = name in table.numeric | table.unbroken
+        words = map(cell_len, (word for text in texts for word in text.split()))
+        longest = body[place] if whole else min(max(words, default=0), _LONG_WORD)
+        least[place] = max(longest, 1, *map(cell_len, head.split()))
         widths[place] = max(1, cell_len(head), body[place])
-        least[place] = max(map(cell_len, [*head.split(), *kept, " "]))
 
     def excess(of: dict[int, int]) -> int:
         return sum(of[place] + _GAP for place in widths) - _GAP - room
@@ -123,10 +118,7 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
     for name in table.first_to_go:
         if excess(least) > 0 and name in table.columns:
             del widths[table.columns.index(name)]
-    words = {place: least[place] if name in table.numeric | table.unbroken else _LEAST
-             for place, name in enumerate(table.columns)}  # fmt: skip
-    for bound in (least, words):
-        while excess(widths) > 0 and (slack := [place for place in widths if widths[place] > bound[place]]):
-            # Headings first: breaking one costs a single line.
-            widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
+    while excess(widths) > 0 and (slack := [place for place in widths if widths[place] > least[place]]):
+        # Headings first: breaking one costs a single line.
+        widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
     return widths

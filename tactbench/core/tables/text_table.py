@@ -72,21 +72,16 @@ class TextTable:
 
     def compact(self, keep: Collection[str] = ()) -> TextTable:
         """Return the table without columns that are empty in all lines, except for columns in `keep`."""
-        if not self.lines:
-            return self
-        texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
-        filled = [name for name, column in texts if name in keep or any(text.strip(ABSENT) for text in column)]
-        return self.only(filled)
+        kept = [
+            place for place, name in enumerate(self.columns)
+            if not self.lines or name in keep or any(line[place].strip(ABSENT) for line in self.lines)
+        ]  # fmt: skip
 
-    def only(self, names: Collection[str]) -> TextTable:
-        """Return the table with only the columns in `names`."""
-        kept = [place for place, name in enumerate(self.columns) if name in names]
-        return replace(
-            self,
-            columns=tuple(self.columns[place] for place in kept),
-            lines=tuple(tuple(line[place] for place in kept) for line in self.lines),
-            headings=tuple(self.headings[place] for place in kept) if self.headings else (),
-        )
+        def only(texts: Sequence[str]) -> tuple[str, ...]:
+            return tuple(texts[place] for place in kept)
+
+        headings = only(self.headings) if self.headings else ()
+        return replace(self, columns=only(self.columns), lines=tuple(map(only, self.lines)), headings=headings)
 
 
 def sort_value(text: str) -> float | None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from tactbench.core.conformance.streams import good, joined, marks_of
+from tactbench.core.conformance.streams import RATE_SHARE, good, joined, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.recording.clock_fit import ClockFit, wrong_rate
+from tactbench.core.recording.clock_fit import fit, wrong_rate
 from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-from tactbench.devices.driver import Driver
 from tactbench.devices.rig_devices import descriptor_of, open_driver
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.byte_link import ByteLink
@@ -22,11 +20,6 @@ from tactbench.links.link import Clock
 
 READ_S = 0.25
 """Longest wait of one read of a driver [s]."""
-RATE_TOLERANCE = 0.02
-"""Largest relative error of a right rate. Assumed: quartz is a hundred times better, a timer of
-whole milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
-HELD_S = 0.016
-"""Longest time for which a usual USB serial adapter holds data back (default of FTDI's latency timer) [s]."""
 _CAUSES = {"lost": " (host or bus too busy?)", "MISSING": " (a part not connected?)",
            "SUSPECT": " (cable, shield, ground?)", "SATURATED": " (is something touching it?)"}  # fmt: skip
 
@@ -73,73 +66,57 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
 
 
 def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: float, clock: Clock) -> None:
-    descriptor = descriptor_of(registry, check.name, entry)
+    descriptor, blocks = descriptor_of(registry, check.name, entry), list[Block]()
     with open_driver(descriptor, entry, clock) as driver:
         try:
             check.identity = dict(driver.identify())
             if getattr(descriptor, "kind", "") == "motor":
                 check.remarks.append("a motor: not started")
                 return
-            _read(check, driver, seconds, clock)
+            driver.start()
+            order = {stream.name: SequenceCheck() for stream in driver.streams}
+            until_ns = clock() + round(seconds * 1e9)
+            while (left_s := (until_ns - clock()) * 1e-9) > 0:
+                blocks += filter(None, (order[block.stream](block) for block in driver.read(min(READ_S, left_s))))
+            driver.stop()
         finally:
             check.counts = {name: number for name, number in driver.counts.items() if number}
+        for name, stream in joined("driver.read", driver.streams, blocks).items():
+            if len(stream.data):
+                _judge(check, stream, order[name])
+            else:
+                check.problems.append(f"No data of stream {name} came within {seconds:g} s. {ByteLink.silence_hint}")
 
 
-def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
-    driver.start()
-    order = {stream.name: SequenceCheck() for stream in driver.streams}
-    blocks: list[Block] = []
-    until_ns = clock() + round(seconds * 1e9)
-    try:
-        while (left_s := (until_ns - clock()) * 1e-9) > 0:
-            blocks += filter(None, (order[block.stream](block) for block in driver.read(min(READ_S, left_s))))
-    finally:
-        driver.stop()
-    for name, stream in joined("driver.read", driver.streams, blocks).items():
-        if len(stream.data):
-            about, problems = _about(check.name, stream, order[name])
-            check.streams += [{**about, **record} for record in _noise(stream)]
-            check.problems += problems
-        else:
-            check.problems.append(f"No data of stream {name} came within {seconds:g} s. {ByteLink.silence_hint}")
-
-
-def _about(device: str, stream: StreamData, order: SequenceCheck) -> tuple[dict[str, Any], list[str]]:
-    """Return statistics of a stream (rate, lost rows, clock drift) and the problems found."""
+def _judge(check: DeviceCheck, stream: StreamData, order: SequenceCheck) -> None:
+    """Add the problems of a stream, and a record for each kind of its channels, with the noise of the channels."""
     name, rows, times, stated_hz = stream.spec.name, len(stream.data), stream.t_ns, stream.spec.rate_hz
-    marks, hz, drift, problems = np.bitwise_or.reduce(marks_of(stream), axis=1), None, None, []
+    hz = drift_ppm = None
     if times is not None and times[-1] > times[0]:
         hz = float(np.count_nonzero(times > times[0]) / (times[-1] - times[0]) * 1e9)
-        allowed = RATE_TOLERANCE + 2 / rows + 2 * HELD_S * hz / rows
-        if stated_hz is not None and abs(hz / stated_hz - 1) > allowed:
-            problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
+        # Rows that come together have one time: as many may be missing at either end.
+        if stated_hz is not None and abs(hz / stated_hz - 1) > RATE_SHARE + 2 / len(np.unique(times)):
+            check.problems.append(f"Stream {name} came at {hz:.4g} Hz; its driver states {stated_hz:.4g} Hz.")
         if stream.device_ns is not None:
-            fit = ClockFit()
-            fit.add(stream.device_ns, times)
-            drift = fit.segments()[-1].drift
+            drift = fit(stream.device_ns, times)[-1].drift
+            drift_ppm = 1e6 * drift
             if refused := wrong_rate(name, drift, round(1e9 * rows / hz)):
-                problems.append(f"{refused}. Correct device_ns in the device's driver.")
-    marked = {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))}
-    lacking = {"lost": order.gaps, "received twice or late": order.duplicates + order.late, **marked}
+                check.problems.append(f"{refused}. Correct device_ns in the device's driver.")
+    marks = np.bitwise_or.reduce(marks_of(stream), axis=1)
+    lacking = {"lost": order.gaps, "received twice or late": order.duplicates + order.late,
+               **{str(flag.name): int(np.count_nonzero(marks & flag)) for flag in Quality}}  # fmt: skip
     texts = [f"{number} {what}{_CAUSES.get(what, '')}" for what, number in lacking.items() if number]
     if texts:
-        problems.append(f"Stream {name}, of {rows} rows: {', '.join(texts)}.")
-    return {
-        "device": device, "stream": name, "rows": rows, "hz": hz, "stated_hz": stated_hz, "lost": order.gaps,
-        "marked": marked, "drift_ppm": None if drift is None else drift * 1e6,
-    }, problems  # fmt: skip
-
-
-def _noise(stream: StreamData) -> Iterator[dict[str, Any]]:
-    """Yield, for each kind and unit of channels, the largest standard deviation and the names of constant channels."""
+        check.problems.append(f"Stream {name}, of {rows} rows: {', '.join(texts)}.")
     values, channels = good(stream), stream.spec.channels
     for kind, unit in dict.fromkeys((channel.kind, channel.unit) for channel in channels):
         own = [place for place, one in enumerate(channels) if (one.kind, one.unit) == (kind, unit)]
         columns = {channels[place].name: values[np.isfinite(values[:, place]), place] for place in own}
-        sds = {name: float(column.std(ddof=1)) for name, column in columns.items() if len(column) > 1}
+        sds = {one: float(column.std(ddof=1)) for one, column in columns.items() if len(column) > 1}
         noisiest = max(sds, key=sds.__getitem__, default="")
-        yield {
-            "kind": kind, "unit": unit, "sd_largest": sds.get(noisiest), "noisiest": noisiest,
-            "mean": float(np.nanmean(values[:, own])) if sds else None,
-            "constant": [name for name, sd in sds.items() if sd == 0],
-        }  # fmt: skip
+        check.streams.append({
+            "device": check.name, "stream": name, "rows": rows, "hz": hz, "stated_hz": stated_hz,
+            "lost": order.gaps, "drift_ppm": drift_ppm, "kind": kind, "unit": unit, "sd_largest": sds.get(noisiest),
+            "noisiest": noisiest, "mean": float(np.nanmean(values[:, own])) if sds else None,
+            "constant": [one for one, sd in sds.items() if sd == 0],
+        })  # fmt: skip

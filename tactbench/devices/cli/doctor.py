@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tactbench.devices.cli.host_devices import HostItem
 
 
-@click.command(name="doctor", short_help="Check ports, permissions, extras and clocks, and a rig's devices.")
+@click.command(name="doctor", short_help="List ports, buses and permissions, and check a rig's devices.")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Also check the forces which this rig file permits, then open and read its devices.")  # fmt: skip
 @click.option("--seconds", type=FiniteRange(min=0, max=600), default=3.0, show_default=True, metavar="T",
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @format_option("table", "json")
 @click.pass_context
 def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str | None, shape: str) -> None:
-    """Check ports, permissions, buses, optional packages and clock of this machine, and the devices of a rig.
+    """List ports and buses of this machine, with permissions, and check the devices of a rig.
 
     Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
     printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
@@ -45,7 +45,7 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
 
     registry = load_registry()
     rig = None if rig_file is None else load_rig_file(rig_file, registry)
-    host = look_at_host()
+    host = list(look_at_host())
     would: RigCheck | None = None
     checks: list[DeviceCheck] = []
     if rig is not None:
@@ -56,7 +56,7 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
         if jog is None and seconds and not (would and would.problems):
             remark(f"Reading each device for {seconds:g} s; nothing may touch them.")
             checks = check_devices(rig, registry, seconds=seconds, clock=time.monotonic_ns)
-    denied = [f"{one.name}: permission denied. {one.hint}" for one in host if one.state == "denied"]
+    denied = [f"{one.name}: permission denied. {one.denied}" for one in host if one.denied]
     of_rig = [f"refused: {text}" for text in (would.problems if would else ())]
     of_rig += [f"{check.name}: {text}" for check in checks for text in check.problems]
     if shape == "json":
@@ -81,15 +81,12 @@ def _print(
     from tactbench.core.cli.grid import print_fields, print_records, print_tables
     from tactbench.core.tables.text_table import text_table
 
-    missing = [one for one in host if one.state == "missing"]
-    fields = [("WRONG", text) for text in problems]
-    fields += [("missing", f"{one.kind} {one.name}: {one.text}. {one.hint}") for one in missing]
-    print_fields(fields)
+    print_fields([("WRONG", text) for text in problems])
     print_tables([text_table(one.title, one.head, one.rows) for one in (would.tables if would else ())])
     print_records([one for check in checks for one in check.streams], "table", title="untouched")
     fields = []
     for check in checks:
         facts = [*check.remarks, *(f"{name} {value}" for name, value in {**check.identity, **check.counts}.items())]
         fields.append((check.name, f"{check.device}, {check.link}: {', '.join(facts)}"))
-    works = (f"{one.name} ({one.text})" if one.text else one.name for one in host if one.state == "works")
-    print_fields([*fields, ("works", ", ".join(works))])
+    fields += [(one.kind, f"{one.name} {one.text}") for one in host]
+    print_fields(fields or [("ports", "this machine has no serial port, SPI device or CAN interface")])

@@ -72,8 +72,6 @@ def _print_file(live: RigFile) -> None:
     """Print the rig file that opens the devices, and the command that records with it."""
     import yaml
 
-    from tactbench.core.tables.text import command_line
-
     file = live
     if file.rig == "bench" and file.devices:
         for name, entry in file.devices.items():
@@ -81,6 +79,5 @@ def _print_file(live: RigFile) -> None:
         file = file.model_copy(update={"devices": {}})
     plain = file.model_dump(mode="json", exclude_defaults=True, exclude={"version"})
     click.echo(f"{HEAD}\n{yaml.safe_dump({'version': 1, **plain}, sort_keys=False)}", nl=False)
-    words = ("--rig-file", "rig.yaml", "--sensor", next(iter(file.sensors)), "--live", "--out", "press.h5")
     remark("Ctrl-C ends the emulated devices. Save the text above as rig.yaml, then record in another terminal:")
-    remark(f"  {command_line('tactbench', 'record', *words)}")
+    remark(f"  tactbench record --rig-file rig.yaml --sensor {next(iter(file.sensors))} --live --out press.h5")

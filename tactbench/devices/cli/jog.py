@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, RigFile
 from tactbench.core.tables.terminal import remark
 from tactbench.devices.driver import Driver
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Limits
 from tactbench.devices.positioner import Positioner
@@ -47,9 +46,6 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
         known = ", ".join(file.devices) if file and file.force else "none with a force sensor"
         raise UsageError(f"No rig file has an axis {name!r}.", hint=f"Axes in --rig-file: {known}.")
 
-    def ask(text: str) -> str:
-        return str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True))
-
     clock: Clock = time.monotonic_ns
     with ExitStack() as stack:
         links: dict[str, Any] = {}
@@ -63,11 +59,10 @@ def jog_axis(rig: RigFile | None, would: RigCheck | None, registry: Registry, na
         axis = drivers[name]
         if not isinstance(axis, Positioner):
             raise UsageError(f"The device {name} is not an axis.", hint="Give an axis of the rig after --jog.")
-        move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n, ask, remark)
+        move_by_steps(name, axis, drivers[FORCE], file.force, would.travel_ceiling_n)
 
 
-def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float,
-                  ask: Callable[[str], str], say: Callable[[str], None]) -> None:  # fmt: skip
+def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry, ceiling_n: float) -> None:
     """Take the force's zero, home the axis if needed, and move it by the operator's answers until an empty answer.
 
     The axis halts if the norm of the force reaches `ceiling_n`, or if the force is not known; after that only a step
@@ -92,33 +87,30 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
 
     back = 0
 
-    def look() -> str:
-        """Read axis and force once; return the problem with the force, empty if there is no problem."""
-        axis.update(0.0)
-        found = [watch.take(block, limits, travelling=True) for block in force.read(LOOK_S)]
-        problem = next(filter(None, found), None) or watch.old(clock(), limits)
-        return ": ".join(problem) if problem else ""
-
-    def look_afresh() -> str:
-        """Read until a force sample arrives after this call; return the problem with the force, if any."""
-        since_ns = clock()
-        while not (wrong := look()) and watch.t_ns < since_ns:
-            pass
-        return wrong
+    def look(since_ns: int = 0) -> str:
+        """Read axis and force, until a sample has come after a time; return the problem with the force, if any."""
+        problem, until_ns = None, clock() + round(1e9 * OLD_S)
+        while True:
+            axis.update(0.0)
+            found = [watch.take(block, limits, travelling=True) for block in force.read(LOOK_S)]
+            problem = next(filter(None, found), None)
+            if problem or watch.t_ns >= since_ns or clock() > until_ns:
+                return ": ".join(problem or watch.old(clock(), limits) or ())
 
     def answer_to(text: str) -> str:
-        """Return the answer to a prompt, after reading the force samples received while the prompt was shown."""
-        answer, since_ns = ask(text).strip(), clock()
-        while watch.t_ns < since_ns and clock() < since_ns + 1e9 * OLD_S:
-            for block in force.read(LOOK_S):
-                watch.take(block, None)
+        """Return the answer to a prompt; the force samples received while it was shown are dropped."""
+        nonlocal watch
+        answer = str(click.prompt(text, default="", show_default=False, prompt_suffix="", err=True)).strip()
+        force.stop()
+        force.start()
+        watch = ForceWatch(stream)
         return answer
 
     def move(step_m: float) -> None:
         """Carry out a step if the force permits it or the step leads back; halt at a problem with the force."""
         nonlocal back
         way = int(math.copysign(1, step_m))
-        if (wrong := look_afresh()) and way != back:
+        if (wrong := look(clock())) and way != back:
             raise RigError(f"The axis moves no further in this direction: {wrong}.", hint="Move it back.")
         most_n, halted = abs(watch.force_n) + ceiling_n, ""
         axis.move_to(axis.position + step_m, min(SPEED_M_S, axis.facts.speed))
@@ -129,7 +121,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
                 halted = wrong
         back = -way
         if halted:
-            say(f"The {name} was halted: {halted}")
+            remark(f"The {name} was halted: {halted}")
 
     try:
         if not (axis.homed or axis.find_home()):
@@ -140,7 +132,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         if not axis.enabled:
             axis.enable()
         while True:
-            wrong = look_afresh()
+            wrong = look(clock())
             where = f"{name} at {1e3 * axis.position:.3f} mm, {watch.force_n:+.3f} N{f' ({wrong})' if wrong else ''}"
             answer = answer_to(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: step in mm; Enter alone: end. ")
             if not answer:
@@ -151,9 +143,9 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
                     raise UsageError(f"A step of {answer} mm is longer than the permitted {1e3 * LONGEST_M:g} mm.")
                 move(step_m)
             except ValueError:
-                say(f"{answer!r} is neither + nor - nor a number of mm.")
+                remark(f"{answer!r} is neither + nor - nor a number of mm.")
             except TactbenchError as error:
-                say(str(error))
+                remark(str(error))
     finally:
         if axis.moving:
             axis.halt()

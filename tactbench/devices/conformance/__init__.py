@@ -1,3 +1,3 @@
-"""Checks of device drivers, on emulators and on real devices."""
+"""Checks of device drivers on emulators."""
 
-from tactbench.devices.conformance import driver, positioner, real  # noqa: F401  (their checks, in this order)
+from tactbench.devices.conformance import driver, positioner  # noqa: F401  (their checks, in this order)

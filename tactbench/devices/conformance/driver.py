@@ -7,13 +7,16 @@ import math
 import re
 import struct
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import (
@@ -27,33 +30,27 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, FloatArray, Quality, StreamData
+from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
-from tactbench.devices.driver import Driver
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.emulator import Senses
 from tactbench.devices.rig_devices import emulated_device, open_driver
 from tactbench.devices.row_driver import RowDriver
-from tactbench.links.link import Clock
 
 # All numbers are assumed.
 READ_S, RATED_S, WAIT_S, SHORT_S = 1.0, 3.0, 0.1, 0.005  # a reading; one of the rate; longest wait of a read; no wait
 LATE = 0.05  # share by which the times of rows may span more or less than the time that passed
 BEFORE_S, GONE_AT_S = 2.0, 10.0  # time of an emulator before its driver is made; time at which the line is unplugged
 WRAPS, BEFORE_WRAP = (2**8, 2**16, 2**32), 10  # counts at which counters wrap; samples from the set count to the wrap
-WRAP_ROWS, WORK_S = 600, 2.0  # rows that are read where no counter is found, within so much processor time
+WRAP_ROWS = 300  # rows that are read, so that any counter of 8 bits wraps
 CLOCK_WRAPS_S = (2**16 * 1e-3, 2**32 * 1e-6)  # wraps of 16 bits in milliseconds, and of 32 in microseconds
 CLOCK_SHARE, CLOCK_STEP_S = 0.05, 0.5  # largest difference in rate of a device's clock, and its largest step
-STEP, LAG_ROWS, LAG_S = (0.25, 0.75), 3, 0.02  # levels of a step in shares of the range; its largest delay
+LAG_ROWS, LAG_S = 3, 0.02  # largest delay of a step
 SLEEP_S, TRIES = 0.02, 8  # wall time of `read(0)` that is a sleep if a processor was less busy; the quickest of 8 reads
 MOST_STILL = 1000  # most reads at one moment, of a device that sends many samples at once
-LEVELS, MOVING_HZ, STALE = (
-    8,
-    997.3,
-    0.1,
-)  # levels of a reading; frequency of a moving one; share of equal rows by chance
+LEVELS, MOVING_HZ, STALE = 8, 997.3, 0.1  # levels and frequency of readings; share of equal rows by chance
 SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6  # bytes of pieces; time held back; time between pieces
 DAMAGE_EVERY, DAMAGE, UNLUCKY = 16, 5, 0.1  # each n-th piece is damaged; bytes it loses; share that may pass a checksum
 LOAD_N, READ_N, OVERLOAD_N = 0.5, 0.02, 1e6  # a load; noise and step of a converter; more than any sensor bears
@@ -90,12 +87,20 @@ class _Adapter:
 
 
 class Opened(NamedTuple):
-    """An open driver, on its emulator in virtual time or on a real line."""
+    """An open driver on its emulator in virtual time."""
 
     subject: Subject
-    driver: Driver
-    clock: Clock
-    emulator: Any = None
+    driver: Any
+    devices: EmulatedDevices
+    emulator: Any
+
+    def clock(self) -> int:
+        """Return the virtual time [ns]."""
+        return self.devices.clock()
+
+    def wait(self, seconds: float) -> None:
+        """Let virtual time pass."""
+        self.devices.advance(self.clock() + round(seconds * 1e9))
 
     def channels(self) -> list[ChannelSpec]:
         """Return the channels of all streams of the driver."""
@@ -137,7 +142,7 @@ class Opened(NamedTuple):
 def emulated(
     subject: Subject, *faults: str, senses: Senses = lambda t_s: {}, change: Callable[[bytes], bytes] | None = None,
     started: bool = True, before_s: float = BEFORE_S, of_both: Mapping[str, Any] = MappingProxyType({}), **options: Any,
-) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
+) -> Iterator[Opened]:  # fmt: skip
     """Open the driver on its emulator, which has run for `before_s` seconds, and start it if `started`.
 
     `faults` apply to the emulator, `change` to each piece of bytes sent to the driver (their sizes change, too),
@@ -153,14 +158,14 @@ def emulated(
     entry = entry.model_copy(update={"options": {**of_both, **options}})
     with code_of("driver", subject):
         driver = open_driver(subject.descriptor, entry, devices.clock, devices.opener(name))
-    opened = Opened(subject, driver, devices.clock, device.emulator)
+    opened = Opened(subject, driver, devices, device.emulator)
     try:
         if started:
             opened.call("start")
-        yield opened, devices
+        yield opened
     finally:
         with suppress(Exception):
-            opened.driver.close()
+            driver.close()
 
 
 @check("sensor", "device", needs="code-names-resolve")
@@ -174,9 +179,9 @@ def driver_opens(subject: Subject) -> None:
     if descriptor.driver is None:
         skip("its descriptor has no driver: the device can be simulated or replayed, not read")
     if descriptor.emulator is None:
-        skip("its descriptor has no emulator: the driver can be checked on a real device only, by `--rig-file FILE`")
+        skip("its descriptor has no emulator: the driver can be tried on a real device only, by `tactbench doctor`")
     own = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.channels()
-    with emulated(subject, started=False) as (opened, devices):
+    with emulated(subject, started=False) as opened:
         identity = dict(opened.call("identify"))
         if not all(isinstance(one, str) for pair in identity.items() for one in pair):
             fail("driver.identify", f"returned {identity!r}; a dict of names and texts is needed")
@@ -187,7 +192,7 @@ def driver_opens(subject: Subject) -> None:
         with code_of("driver.close: the link could not be opened again after close()", subject):
             opened.driver.close()
             opened.driver.close()
-            devices.open_link(subject.name).close()
+            opened.devices.open_link(subject.name).close()
     try:
         with emulated(subject, started=False, no_such_option=1):
             pass
@@ -210,28 +215,20 @@ def driver_reads(subject: Subject) -> None:
     def moving(t_s: float) -> dict[str, float]:
         return {one.name: _reading(one, MOVING_HZ * t_s % 1.0)[0] for one in every}
 
-    with emulated(subject, senses=moving, started=False) as (opened, _):
+    with emulated(subject, senses=moving, started=False) as opened:
         every += opened.channels()
-        for name, stream in look_at(opened).items():
+        opened.call("start")
+        opened.read(WAIT_S)
+        began_ns = opened.clock()
+        for name, stream in opened.read(RATED_S).items():
+            where, ended_ns = f"driver.read: {name}", opened.clock()
+            if not len(stream.data):
+                fail(where, f"no data came within {RATED_S:g} s")
+            times_are_right(where, stream, (ended_ns - began_ns) * 1e-9, LATE, ended_ns)
+            _clock_is_right(f"{where}.device_ns", stream)
             again = float((np.diff(stream.data, axis=0) == 0).all(axis=1).mean())
-            if again > STALE and getattr(subject.descriptor, "kind", "") != "motor":
-                fail(f"driver.read: {name}", f"{again:.0%} of the rows repeat the previous row with a new time")
-
-
-def look_at(opened: Opened) -> dict[str, StreamData]:
-    """Start a driver, read it for `RATED_S`, and return the streams; fail the check if times of rows are wrong."""
-    opened.call("start")
-    opened.read(WAIT_S)
-    began_ns = opened.clock()
-    found = opened.read(RATED_S)
-    ended_ns = opened.clock()
-    opened.driver.stop()
-    for name, stream in found.items():
-        if not len(stream.data):
-            fail("driver.read", f"no data of stream {name} came within {RATED_S:g} s")
-        times_are_right(f"driver.read: {name}", stream, (ended_ns - began_ns) * 1e-9, LATE, ended_ns)
-        _clock_is_right(f"driver.read: {name}.device_ns", stream)
-    return found
+            if again > STALE and not _is_motor(subject):
+                fail(where, f"{again:.0%} of the rows repeat the previous row with a new time")
 
 
 def _clock_is_right(where: str, stream: StreamData) -> None:
@@ -263,41 +260,72 @@ def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
     return low + share * span, span / (LEVELS - 1) / 4 + rounding
 
 
-def _skip_motor(subject: Subject) -> None:
-    if getattr(subject.descriptor, "kind", "") == "motor":
-        skip("the position of a motor is set by its rig, not by a test reading")
+def _is_motor(subject: Subject) -> bool:
+    return getattr(subject.descriptor, "kind", "") == "motor"
 
 
 @check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
-    """Swapped channels or bytes, a lost sign or a wrong unit (gram-force) give plausible but wrong readings.
+    """Swapped channels or bytes, a lost sign, a wrong unit or a hidden filter give plausible but wrong readings.
 
-    Decode into the order and units of the stream's channels; the emulator must encode the readings of its senses.
+    Decode into the order and units of the stream's channels; the emulator must encode the readings of its senses. State
+    the delay of a filter in `link_delay`; return no row before the device's first sample, or mark it as MISSING; keep
+    the rows of a block in the order of their time.
     """
-    _skip_motor(subject)
-    place, sensed = 1, dict[str, float]()
-    with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
-        every = opened.channels()
-        while place == 1 or place < len(every):
-            levels = [number // place % LEVELS / (LEVELS - 1) for number in range(len(every))]
-            meant = {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
-            sensed |= {name: value for name, (value, _) in meant.items()}
-            opened.read(WAIT_S)
-            for name, stream in opened.read().items():
-                for column, channel in enumerate(stream.spec.channels):
-                    value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
-                    expected, near = meant[channel.name]
-                    if abs(value - expected) <= near:
-                        continue
-                    others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
-                    guess = f", which is the reading of {others[0]}" if others else ""
-                    if not others and abs(value + expected) <= near:
-                        guess = ": is the sign reversed?"
-                    elif not others and channel.unit == "N":
-                        guess = likely(value / expected)
-                    text = f"read {value:.4g}, expected {expected:.4g} {channel.unit}{guess}"
-                    fail(f"driver.read: {name}.{channel.name}", text)
-            place *= LEVELS
+    if _is_motor(subject):
+        skip("the position of a motor is set by its rig, not by a test reading")
+    with emulated(subject, started=False) as opened:
+        every, row_s = opened.channels(), max(0.01, 1 / opened.slowest_hz)
+    steps_s, batches, stated = list[float](), Counter[str](), getattr(subject.spec, "link_delay", None)
+
+    @cache
+    def meant(turn: int) -> dict[str, tuple[float, float]]:
+        """Return a reading and its tolerance for each channel; any two channels differ in a turn."""
+        levels = [(number // LEVELS**turn + 3 * turn) % LEVELS / (LEVELS - 1) for number in range(len(every))]
+        return {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
+
+    def senses(t_s: float) -> dict[str, float]:
+        return {name: value for name, (value, _) in meant(sum(t_s >= step_s for step_s in steps_s)).items()}
+
+    with emulated(subject, senses=senses) as opened:
+        for turn in range(max(3, math.ceil(math.log(len(every), LEVELS)))):
+            if turn:
+                steps_s.append(1e-9 * opened.clock() + 4 * row_s)
+                opened.wait(8 * row_s)  # the step lies in the middle of a block
+            blocks = opened.blocks(READ_S + 2 * LAG_ROWS * row_s)
+            for block in () if turn else blocks:
+                batches[block.stream] = max(batches[block.stream], len(block.data))
+            for name, stream in joined("driver.read", opened.driver.streams, blocks).items():
+                where, rows_s = f"driver.read: {name}", (LAG_ROWS + batches[name]) / (stream.spec.rate_hz or 1 / row_s)
+                _steady(where, stream, meant(turn))
+                if not turn:
+                    if not _as_meant(stream, meant(0))[0]:
+                        fail(where, "the first row is not as sensed: was it made before the first sample?")
+                    continue
+                since_s = (0.0 if stream.t_ns is None else 1e-9 * stream.t_ns) - steps_s[-1]
+                if (~_as_meant(stream, meant(turn - 1)) & (since_s < -row_s)).any():
+                    fail(where, "rows of one block are not in order of time")
+                late_s = float(np.where(_as_meant(stream, meant(turn)), 0.0, since_s).max())
+                if late_s > rows_s + LAG_S + (0.0 if stated is None else stated.to("s")):
+                    fail(where, f"a step is {late_s:.2g} s late: state the delay of a filter in link_delay")
+
+
+def _steady(where: str, stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> None:
+    """Fail unless the second half of a stream has the meant readings."""
+    for column, channel in enumerate(stream.spec.channels):
+        value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
+        expected, near = meant[channel.name]
+        if not abs(value - expected) <= near:
+            others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
+            guess = f", which is the reading of {others[0]}" if others else likely(value / expected)
+            fail(f"{where}.{channel.name}", f"read {value:.4g}, expected {expected:.4g} {channel.unit}{guess}")
+
+
+def _as_meant(stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> npt.NDArray[np.bool_]:
+    """Return an (n,) array that is true for rows of which at least half of the finite readings are as meant."""
+    expected, near = np.transpose([meant[one.name] for one in stream.spec.channels])
+    off = np.abs(good(stream) - expected)
+    return np.asarray((off <= near).sum(axis=1) >= 0.5 * np.isfinite(off).sum(axis=1))
 
 
 @check("sensor", "device", needs="driver-reads")
@@ -312,7 +340,7 @@ def driver_decodes_the_manual(subject: Subject) -> None:
     if subject.descriptor.emulated_link != "bytes":
         skip("its link is not a stream of bytes")
     data = [b""]
-    with emulated(subject, change=lambda piece: data[0] or piece) as (opened, _):
+    with emulated(subject, change=lambda piece: data[0] or piece) as opened:
         opened.read()
         data[0] = bytes.fromhex(frame.data)
         opened.read(WAIT_S)
@@ -340,9 +368,9 @@ def driver_takes_any_pieces(subject: Subject) -> None:
             return data
         return data[: len(data) // 2] + b"\xff" + data[len(data) // 2 + lost :]
 
-    with emulated(subject) as (opened, _):
+    with emulated(subject) as opened:
         sound = opened.read()
-    with emulated(subject, change=damaged) as (opened, _):
+    with emulated(subject, change=damaged) as opened:
         cut = opened.read()
         lost, before = DAMAGE, dict(opened.driver.counts)
         found = opened.read(2 * READ_S)
@@ -388,28 +416,23 @@ def driver_counts_on(subject: Subject) -> None:
                     fail(f"driver.read: {name}.sequence", f"row {a} is followed by row {b}, and no row was lost")
         return max(len(stream.data) for stream in found.values())
 
-    with emulated(subject, started=False) as (opened, _):
+    with emulated(subject, started=False) as opened:
         quiet = not math.isfinite(opened.due_s)
         opened.call("start")
-        first, before = opened.read().values(), _counters(opened.emulator)
+        first, before, seconds = opened.read().values(), _counters(opened.emulator), 4 * BEFORE_WRAP / opened.slowest_hz
         clocked, numbered = (any(getattr(one, name) is not None for one in first) for name in ("device_ns", "sequence"))
         if not clocked and not numbered:
             skip("the device has neither sample numbers nor a clock")
-        some_s, until_s = 4 * BEFORE_WRAP / opened.slowest_hz, time.process_time() + WORK_S
-        rows, now = counted(opened, READ_S + some_s), _counters(opened.emulator)
+        rows, now = counted(opened, WRAP_ROWS / opened.slowest_hz), _counters(opened.emulator)
         moved = [one for one, value in now.items() if abs(value - before.get(one, value) - rows) <= 0.1 * rows]
         for wrap, name in itertools.product(WRAPS, moved if numbered else ()):
             held = vars(opened.emulator)
             held[name] = type(held[name])(wrap - BEFORE_WRAP)
             with suppress(struct.error, OverflowError):  # one of fewer bits
                 opened.read(1 / opened.slowest_hz)
-                counted(opened, some_s)
-        while numbered and not moved and rows < WRAP_ROWS:
-            if time.process_time() > until_s:
-                skip(f"the counter did not overflow within {rows} rows or {WORK_S:g} s of processor time")
-            rows += counted(opened, READ_S)
+                counted(opened, seconds)
     for wraps_s in CLOCK_WRAPS_S if clocked and quiet else ():
-        with emulated(subject, before_s=wraps_s - 1.0) as (opened, _):
+        with emulated(subject, before_s=wraps_s - 1.0) as opened:
             for name, stream in opened.read(2.0).items():
                 _clock_is_right(f"driver.read: {name}.device_ns", stream)
 
@@ -420,7 +443,7 @@ def driver_waits_and_stops(subject: Subject) -> None:
 
     Wait only in the link, and no longer than `timeout_s` in all; never sleep. Let the device stop in stop().
     """
-    with emulated(subject, started=False) as (opened, devices):
+    with emulated(subject, started=False) as opened:
         quiet = not math.isfinite(opened.due_s)
         opened.call("start")
         for wait_s in (WAIT_S, WAIT_S, 0.0):
@@ -433,65 +456,15 @@ def driver_waits_and_stops(subject: Subject) -> None:
         for _ in range(TRIES):
             opened.driver.read(0.0)
             spent.append((time.perf_counter(), time.thread_time()))
-        wall_s, busy_s = min((b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(spent))
+        wall_s, busy_s = min(map(tuple, np.diff(spent, axis=0)))
         if wall_s > SLEEP_S and busy_s < wall_s / 2:
             fail("driver.read", f"read(0) sleeps for {wall_s - busy_s:.2g} s; it must return at once")
         opened.call("stop")
-        devices.advance(opened.clock() + round(1e9 * WAIT_S))
+        opened.wait(WAIT_S)
         # Of some devices no source says how they are stopped.
         own = getattr(type(opened.driver), "quiet", None)
         if (quiet if own is None else own is not RowDriver.quiet) and math.isfinite(opened.due_s):
             fail("driver.stop", "the device still sends after stop()")
-
-
-@check("sensor", "device", needs="driver-reads-what-is-sensed")
-def driver_follows_a_step(subject: Subject) -> None:
-    """A filter that is not stated makes every reading late, and rows before the first complete sample read zero.
-
-    State the delay of a filter in `link_delay`; return no row before the device's first sample, or mark it as MISSING;
-    keep the rows of a block in the order of their time.
-    """
-    _skip_motor(subject)
-    steps_s = list[float]()
-
-    def senses(t_s: float) -> dict[str, float]:
-        return {one.name: _reading(one, STEP[sum(t_s >= step_s for step_s in steps_s) % 2])[0] for one in every}
-
-    with emulated(subject, started=False) as (opened, _):
-        every, slowest = opened.channels(), opened.slowest_hz
-    row_s = max(0.01, 1 / slowest)
-    with emulated(subject, senses=senses) as (opened, devices):
-        steps_s.append(1e-9 * opened.clock() + READ_S)
-        blocks = opened.blocks(2 * READ_S + 2 * LAG_ROWS / slowest)
-        steps_s.append(1e-9 * opened.clock() + 4 * row_s)
-        devices.advance(opened.clock() + round(8e9 * row_s))  # this step lies in the middle of a block
-        after = opened.blocks(READ_S)
-    stated, streams = getattr(subject.spec, "link_delay", None), opened.driver.streams
-    late = joined("driver.read", streams, after)
-    for name, stream in joined("driver.read", streams, blocks).items():
-        found, times = _shares(stream)
-        before = np.flatnonzero(found < STEP[1])
-        if len(before) in (0, len(found)):  # a stream that gives no steady level
-            continue
-        if abs(found[0]) > STEP[0]:
-            fail(f"driver.read: {name}", "the first row is not as sensed: was it made before the first sample?")
-        late_s = float(times[min(int(before[-1]) + 1, len(found) - 1)]) - steps_s[0]
-        batch = max(len(one.data) for one in blocks if one.stream == name)
-        if late_s > (LAG_ROWS + batch) * np.ptp(times) / len(found) + LAG_S + (
-            0.0 if stated is None else stated.to("s")
-        ):
-            fail(f"driver.read: {name}", f"a step is {late_s:.2g} s late: state the delay of a filter in link_delay")
-        if (np.diff(_shares(late[name])[0]) > STEP[0]).any():
-            fail(f"driver.read: {name}", "rows of one block are not in order of time")
-
-
-def _shares(stream: StreamData) -> tuple[FloatArray, FloatArray]:
-    """Return the finite readings as (n,) shares of a step, 0 its lower and 1 its upper level, and (n,) times [s]."""
-    low, high = (np.array([_reading(one, share)[0] for one in stream.spec.channels]) for share in STEP)
-    found = np.asarray(((good(stream) - low) / (high - low)).mean(axis=1))
-    whole = np.isfinite(found) & (stream.t_ns is not None)
-    times = np.zeros(len(found)) if stream.t_ns is None else 1e-9 * stream.t_ns
-    return found[whole], times[whole]
 
 
 @check("sensor", "device", needs="driver-reads")
@@ -501,10 +474,10 @@ def driver_reports_what_happens(subject: Subject) -> None:
     Discard in start() the data waiting in the link (Link.discard) and any partial frame. Return an empty list from
     read() when the link raises LinkTimeout, and do not catch LinkUnplugged.
     """
-    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}", started=False) as (opened, devices):
+    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}", started=False) as opened:
         for _ in range(2):
-            began_ns = devices.clock() + round(BEFORE_S * 1e9)
-            devices.advance(began_ns)
+            opened.wait(BEFORE_S)
+            began_ns = opened.clock()
             opened.call("start")
             for name, stream in opened.read().items():
                 early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
@@ -530,27 +503,22 @@ def device_is_fit_for_a_rig(subject: Subject) -> None:
     as SATURATED. Do not move or power a motor in the driver's constructor, identify(), start() and read().
     """
     device, sensed = subject.descriptor.kind, dict[str, float]()
-    kind, unit = ("force", "N") if device == "force" else ("position", "m")
     if device not in ("force", "motor"):
         skip(f"a device of kind {device} is neither force sensor nor motor")
-    with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
-        own = [one for one in opened.channels() if one.kind == kind]
-        for channel in own:
-            if channel.unit != unit:
-                fail(f"driver.streams: {channel.name}.unit", f"the unit is {channel.unit!r}, {unit!r} is needed")
-        if not own:
-            fail("driver.streams", f"no channel of the device is of kind {kind}")
-
-        sensed.update({one.name: OVERLOAD_N for one in own if kind == "force"})
+    kind, unit = ("force", "N") if device == "force" else ("position", "m")
+    with emulated(subject, senses=lambda t_s: sensed) as opened:
+        sensed |= {one.name: OVERLOAD_N for one in opened.channels() if device == one.kind == "force"}
         opened.read()
-        for name, stream in opened.read().items():
-            for column, one in enumerate(stream.spec.channels):
-                if one not in own:
-                    continue
-                where, marks = f"driver.read: {name}.{one.name}", marks_of(stream)[:, column]
-                there = good(stream)[:, column]
-                there = there[np.isfinite(there)]  # none before an axis is homed
-                if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
-                    fail(where, f"the position changes by {1e3 * moved_m:.3g} mm without a move")
-                if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
-                    fail(where, f"rows are not marked SATURATED at {OVERLOAD_N:g} N")
+        own = [(f"driver.read: {name}.{one.name}", one, marks_of(stream)[:, column], good(stream)[:, column])
+               for name, stream in opened.read().items() for column, one in enumerate(stream.spec.channels)
+               if one.kind == kind]  # fmt: skip
+    if not own:
+        fail("driver.streams", f"no channel of the device is of kind {kind}")
+    for where, channel, marks, values in own:
+        if channel.unit != unit:
+            fail(f"driver.streams: {channel.name}.unit", f"the unit is {channel.unit!r}, {unit!r} is needed")
+        if kind == "force" and not (marks & (Quality.SATURATED | BAD)).all():
+            fail(where, f"rows are not marked SATURATED at {OVERLOAD_N:g} N")
+        there = values[np.isfinite(values)]  # none before an axis is homed
+        if kind == "position" and len(there) and (moved_m := float(np.ptp(there))) > STILL_M:
+            fail(where, f"the position changes by {1e3 * moved_m:.3g} mm without a move")

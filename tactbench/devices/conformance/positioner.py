@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
 
 from tactbench.core.conformance.check import Subject, check, fail, skip
 from tactbench.devices.conformance.driver import Opened, emulated
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.positioner import NotReadyError, Positioner
 
 PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
@@ -19,20 +17,12 @@ HOMING_S, MOVE_S = 120.0, 2.0  # timeouts (assumed: 100 mm at 1 mm/s, and back);
 LOOK_S, REST_S = 1e-3, 0.3  # time between two looks at a moving axis; time for which it must stand after a move
 
 
-class _Axis(NamedTuple):
+class _Axis(Opened):
     """A started axis with its emulator, whose position is the true one."""
-
-    opened: Opened
-    devices: EmulatedDevices
-
-    @property
-    def driver(self) -> Any:
-        """Driver of the axis, a Positioner."""
-        return self.opened.driver
 
     def true_m(self) -> float:
         """Return the emulated axis' true position [m]."""
-        return float(self.opened.emulator.position_m)
+        return float(self.emulator.position_m)
 
     def stretch(self) -> tuple[float, float]:
         """Return the ends [m] of a part of the travel with the present position, at most a move of `MOVE_S` long."""
@@ -41,20 +31,20 @@ class _Axis(NamedTuple):
         begin = min(max(low, self.driver.position), high - length)
         return begin, begin + length
 
-    def wait(self, seconds: float, until: Callable[[], bool]) -> None:
+    def update(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         """Update the driver until the condition `until` is true, at most for `seconds`."""
-        end_ns = self.devices.clock() + round(1e9 * seconds)
-        while not until() and (before_ns := self.devices.clock()) < end_ns:
-            self.opened.call("update", LOOK_S)
-            if self.devices.clock() == before_ns:
-                self.devices.advance(before_ns + round(1e9 * LOOK_S))
+        end_ns = self.clock() + round(1e9 * seconds)
+        while not until() and (before_ns := self.clock()) < end_ns:
+            self.call("update", LOOK_S)
+            if self.clock() == before_ns:
+                self.wait(LOOK_S)
 
     def ended(self, what: str, target_m: float, seconds: float) -> None:
         """Wait for the end of a move; fail unless axis and driver then report its target [m], and remain there."""
         began_m = self.true_m()
-        self.wait(seconds, lambda: not self.driver.moving)
+        self.update(seconds, lambda: not self.driver.moving)
         there_m = self.true_m()
-        self.wait(REST_S, lambda: False)
+        self.update(REST_S)
         for where, at_m in ((what, there_m), (what, self.true_m()), ("driver.position", self.driver.position)):
             if not abs(at_m - target_m) <= self.driver.facts.near:
                 turned = (at_m - began_m) * (target_m - began_m) < 0
@@ -65,12 +55,12 @@ class _Axis(NamedTuple):
         """Fail unless the driver refuses a move by NotReadyError."""
         before_m = self.true_m()
         try:
-            self.opened.call("move_to", target_m)
+            self.call("move_to", target_m)
         except AssertionError as failure:
             if not isinstance(failure.__cause__, NotReadyError):
                 raise
             return
-        self.wait(REST_S, lambda: False)
+        self.update(REST_S)
         moved = f"the axis moves by {1e3 * (self.true_m() - before_m):.3g} mm"
         fail("driver.move_to", f"accepts a move to {target_m:g} m {why}; {moved}: call check_move() before sending")
 
@@ -83,20 +73,20 @@ def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
     own = subject.descriptor.emulated_options
     places = PLACES if own.keys().isdisjoint(PLACES) else {}
     given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
-    with emulated(subject, of_both=given) as (opened, devices):
+    with emulated(subject, of_both=given) as opened:
         if not hasattr(opened.emulator, "position_m"):
             fail("emulator", "the emulator lacks `position_m`, the axis' position [m] as its driver counts")
-        axis = _Axis(opened, devices)
+        axis = _Axis(*opened)
         if homed:
             _home(axis)
         yield axis
 
 
 def _home(axis: _Axis) -> None:
-    until_ns = axis.devices.clock() + round(1e9 * HOMING_S)
-    axis.opened.call("home", lambda: axis.devices.clock() > until_ns)
+    until_ns = axis.clock() + round(1e9 * HOMING_S)
+    axis.call("home", lambda: axis.clock() > until_ns)
     if not axis.driver.enabled:
-        axis.opened.call("enable")
+        axis.call("enable")
 
 
 @check("device", needs="driver-reads")
@@ -127,11 +117,11 @@ def axis_goes_where_it_is_sent(subject: Subject) -> None:
         facts = axis.driver.facts
         (low, high), speed = axis.stretch(), facts.speed
         for share in (0.5, 0.8, 0.3):
-            target_m = axis.opened.call("move_to", low + share * (high - low))
+            target_m = axis.call("move_to", low + share * (high - low))
             axis.refused(target_m, "during another move")
             axis.ended("driver.move_to", target_m, facts.seconds(high - low, speed))
         step_m = 0.05 * (high - low)
-        axis.opened.call("move_by", step_m)
+        axis.call("move_by", step_m)
         axis.ended("driver.move_by", target_m + step_m, facts.seconds(step_m, speed))
         low, high = facts.limits
         for beyond_m in (low - step_m, high + step_m, math.nan, math.inf):
@@ -153,16 +143,16 @@ def axis_halts_and_retreats(subject: Subject) -> None:
         most_m = v * (facts.stop_latency_s + 2 * LOOK_S) + v**2 / (2 * facts.acceleration) + facts.near
         for name, goal_m in (("halt", high), ("halt", low), ("retreat", high)):
             start_m = low + 0.5 * (high - low)
-            axis.opened.call("move_to", start_m)
+            axis.call("move_to", start_m)
             axis.ended("driver.move_to", start_m, facts.seconds(high - low, v))
             way = math.copysign(1.0, goal_m - start_m)
-            axis.opened.call("move_to", goal_m)
-            axis.wait(MOVE_S, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
+            axis.call("move_to", goal_m)
+            axis.update(MOVE_S, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
             stays, furthest = name == "halt" or math.isnan(facts.retreat), [way * axis.true_m()]
-            axis.opened.call(name)
+            axis.call(name)
             seconds = facts.seconds(facts.limits[1] - facts.limits[0], min(v, facts.retreat_speed))
             # The condition is looked at in each step of the wait.
-            axis.wait(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
+            axis.update(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
             if (on_m := max(furthest) - furthest[0]) > most_m:
                 text = f"the axis goes on by {1e3 * on_m:.3g} mm, at most {1e3 * most_m:.3g} mm follow"
                 fail(f"driver.{name}", f"{text} from its stated stop latency and acceleration")

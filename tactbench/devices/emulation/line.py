@@ -66,22 +66,21 @@ class Line:
         self._emulator = emulator
         self._faults = tuple(faults)
         self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
-        self._next_s: float | None = None
+        self._polled_s = -math.inf
         self._out: deque[tuple[float, Piece]] = deque()
 
     def feed(self, piece: Piece, now_s: float) -> None:
         """Pass a piece from the host to the device at `now_s`, and deliver all pieces that are due."""
         self.poll(now_s)
-        if self.gone:
-            return
-        self._send(self._emulator.feed(piece, now_s))
-        self.poll(now_s)
+        if not self.gone:
+            self._send(self._emulator.feed(piece, now_s))
+            self.poll(now_s)
 
     def poll(self, now_s: float) -> None:
         """Advance the device to `now_s`, and deliver all pieces that are due."""
         if self.gone:
             return
-        until_s = min(now_s, self._unplugged_s)
+        self._polled_s = until_s = min(now_s, self._unplugged_s)
         if self._emulator.next_s() <= until_s:
             self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
@@ -89,17 +88,13 @@ class Line:
             if self.deliver is not None:
                 self.deliver(t_s, piece)
         self.gone = now_s >= self._unplugged_s
-        self._next_s = math.inf if self.gone else self._due_s(until_s)
 
     def next_s(self) -> float:
         """Return the time of the next event [s]; infinite if there is no event until the host sends a piece."""
-        if self._next_s is None:
-            self._next_s = self._due_s(-math.inf)
-        return self._next_s
-
-    def _due_s(self, polled_s: float) -> float:
+        if self.gone:
+            return math.inf
         due_s = min(self._emulator.next_s(), self._out[0][0] if self._out else math.inf, self._unplugged_s)
-        return due_s if due_s > polled_s else polled_s + _AGAIN_S
+        return due_s if due_s > self._polled_s else self._polled_s + _AGAIN_S
 
     def _send(self, sent: Sequence[Sent]) -> None:
         for left_s, piece in sent:

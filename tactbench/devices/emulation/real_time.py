@@ -8,18 +8,26 @@ import re
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from typing import Self
 
 from tactbench.core.errors import UsageError
 from tactbench.devices.emulation.line import Line, Piece
+from tactbench.devices.emulation.virtual_time import SPI_HZ, EmulatedDevice
 from tactbench.devices.emulator import DeviceEmulator, Sent
 from tactbench.links.can_link import CanFrame
 from tactbench.links.datagram_link import LARGEST_DATAGRAM
-from tactbench.links.link import Clock
 
 STOP_S = 0.05
 """Longest wait of a server without events [s], after which it checks for a request to end."""
+_ADDRESSES = {
+    "bytes": "serial://{}?baud=3000000",  # above the rate of any device; pseudo-terminals have none
+    "spi": f"spi://bridge/{{}}?speed_hz={SPI_HZ}",
+    "can": "can://slcan/{}?bitrate=1000000&sleep_after_open=0",  # nothing here restarts when its port is opened
+}
+"""Addresses of emulated devices' links, with ``{}`` in place of the terminal's path."""
 
 
 class PseudoTerminal:
@@ -100,10 +108,6 @@ class UdpEnd:
         self._socket.close()
 
 
-End = PseudoTerminal | UdpEnd
-"""The emulated device's end of a link of the operating system; its calls never wait."""
-
-
 class SlcanAdapter:
     """Emulated serial adapter (python-can's interface ``slcan``) of a CAN device: a line of text for each data frame.
 
@@ -157,50 +161,81 @@ class SlcanAdapter:
         ]
 
 
-class RealTimeServer:
-    """Server that transfers data between emulated devices and links of the operating system, at the times due.
+class RealTimeDevices:
+    """Emulated devices served in a thread of their own, on links that other processes may open, until :meth:`close`.
 
     Every piece of data has its own due time, so that a wait that ends late delays this piece, but no later piece.
 
     Parameters
     ----------
-    served
-        Line and link of the operating system by device name; the server closes the links.
-    clock
-        Clock [ns] from which the emulators' time is computed.
+    devices
+        Devices by name.
+
+    Attributes
+    ----------
+    addresses
+        Link address by device name, for a rig file.
+
+    Raises
+    ------
+    UsageError
+        If this operating system lacks the needed kind of link.
     """
 
-    def __init__(self, served: Mapping[str, tuple[Line, End]], clock: Clock) -> None:
-        self._clock = clock
-        self._open = dict(served)
+    def __init__(self, devices: Mapping[str, EmulatedDevice]) -> None:
+        self._began_ns = time.monotonic_ns()
+        self._open: dict[str, tuple[Line, PseudoTerminal | UdpEnd]] = {}
+        self._stop = False
+        self._error: BaseException | None = None
         # Waits to the microsecond; epoll's are rounded up to whole milliseconds.
         self._selector = selectors.SelectSelector()
-        for line, end in served.values():
+        for name, device in devices.items():
+            emulator = device.far_end()
+            line = Line(SlcanAdapter(emulator) if device.link == "can" else emulator, device.faults)
+            end = UdpEnd() if device.link == "datagram" else PseudoTerminal(_ADDRESSES[device.link])
             line.deliver = end.send
             self._selector.register(end.fileno(), selectors.EVENT_READ)
+            self._open[name] = line, end
+        self.addresses = {name: end.address for name, (_, end) in self._open.items()}
         self._thread = threading.Thread(target=self._run, name="emulated devices", daemon=True)
-        self._stop = False
-        self.error: BaseException | None = None
-        """Error of an emulator that ended the service; None: no error."""
-
-    def start(self) -> None:
-        """Serve in a separate thread, until :meth:`close`."""
         self._thread.start()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def clock(self) -> int:
+        """Return the nanoseconds since the devices began; emulators, faults and senses use this time in seconds."""
+        return time.monotonic_ns() - self._began_ns
+
+    def check(self) -> None:
+        """Raise the error of an emulator that has ended the service."""
+        if self._error is not None:
+            raise self._error
+
     def close(self) -> None:
-        """End the service and close the links."""
+        """End the devices and release the operating system's links; a second call does nothing."""
         self._stop = True
-        if self._thread.is_alive():
-            self._thread.join()
-        for name in list(self._open):
-            self._unplug(name)
+        self._thread.join()
         self._selector.close()
 
-    def serve(self, at_s: float | None = None) -> float:
-        """Transfer the data received and due at `at_s`, or now; return the time of the next event [s], or infinity."""
+    def _run(self) -> None:
+        try:
+            while not self._stop:
+                wait_s = self._serve() - self.clock() * 1e-9
+                self._selector.select(min(max(0.0, wait_s), STOP_S))
+        except BaseException as error:  # raised by `check`
+            self._error = error
+        for name in list(self._open):
+            self._unplug(name)
+
+    def _serve(self) -> float:
+        """Transfer the data received and due; return the time of the next event [s], or infinity."""
         for name, (line, end) in list(self._open.items()):
             pieces = end.received()
-            now_s = self._clock() * 1e-9 if at_s is None else at_s  # not before the pieces were received
+            now_s = self.clock() * 1e-9  # not before the pieces were received
             for piece in pieces:
                 line.feed(piece, now_s)
             line.poll(now_s)
@@ -213,13 +248,3 @@ class RealTimeServer:
         line.deliver = None
         self._selector.unregister(end.fileno())
         end.close()
-
-    def _run(self) -> None:
-        try:
-            while not self._stop:
-                wait_s = self.serve() - self._clock() * 1e-9
-                self._selector.select(min(max(0.0, wait_s), STOP_S))
-        except BaseException as error:  # raised by EmulatedDevices.advance
-            self.error = error
-            for name in list(self._open):
-                self._unplug(name)

@@ -1,18 +1,48 @@
-"""Virtual time: a clock that advances only when a link waits, and the host's end of links to emulated devices."""
+"""Emulated devices in virtual time: a clock that advances only when a link waits, within one thread."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Self
 
 from tactbench.core.errors import LinkError
-from tactbench.devices.emulation.line import Line, Piece
+from tactbench.core.spec.rig import EmulatedLink
+from tactbench.devices.emulation.line import Line, LinkFault, Piece
+from tactbench.devices.emulator import DeviceEmulator, SpiDeviceEmulator
+from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanFrame, CanLink
 from tactbench.links.datagram_link import DatagramLink
 from tactbench.links.link import Link, Received
+from tactbench.links.spi_bridge import SpiBridge
+
+SPI_HZ = 4_400_000
+"""Clock of an emulated SPI bus [Hz]: that of the BioTac maker's own tools [sourced: docs/links.md]; the bus takes up
+to 10 MHz."""
+HELD = 8
+"""Number of batches that an emulated SPI bridge stores, equal to that of the firmware in docs/links.md."""
+
+
+@dataclass(frozen=True)
+class EmulatedDevice:
+    """Model of a device, with the kind and the faults of its link."""
+
+    link: EmulatedLink
+    emulator: DeviceEmulator | SpiDeviceEmulator
+    """SpiDeviceEmulator for the link kind `spi`, DeviceEmulator for other kinds."""
+    faults: tuple[LinkFault, ...] = ()
+    """Faults of the link; faults of the device itself are in its emulator."""
+
+    def far_end(self) -> DeviceEmulator:
+        """Return the device's end of its link; an SPI device gets a bridge."""
+        emulator: Any = self.emulator
+        if self.link == "spi":
+            emulator = BridgeEmulator(emulator.exchange, holds=HELD)
+        return emulator  # type: ignore[no-any-return]
 
 
 class VirtualTime:
@@ -26,18 +56,13 @@ class VirtualTime:
         Lines of the devices; simultaneous events happen in the order of this list.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, lines: list[Line]) -> None:
         self.now_s = 0.0
-        self.lines: list[Line] = []
+        self.lines = lines
 
     def __call__(self) -> int:
         """Return the virtual time [ns]."""
         return round(self.now_s * 1e9)
-
-    def advance(self, until_ns: int) -> None:
-        """Advance all devices up to and including `until_ns`; a past time changes nothing."""
-        while self.step(until_ns * 1e-9):
-            pass
 
     def step(self, until_s: float) -> bool:
         """Advance to the next event of a device and carry it out, or to `until_s` if that is earlier.
@@ -55,6 +80,49 @@ class VirtualTime:
         self.now_s = max(self.now_s, due_s)
         line.poll(self.now_s)
         return True
+
+
+class EmulatedDevices:
+    """Emulated devices in virtual time, which advances by the wait of a link or :meth:`advance`.
+
+    Parameters
+    ----------
+    devices
+        Devices by name.
+
+    Attributes
+    ----------
+    clock
+        Nanoseconds since the devices began, for drivers and links; emulators, faults and senses use the same time
+        in seconds.
+    """
+
+    def __init__(self, devices: Mapping[str, EmulatedDevice]) -> None:
+        self._devices = dict(devices)
+        self._lines = {name: Line(one.far_end(), one.faults) for name, one in devices.items()}
+        self.clock = VirtualTime([*self._lines.values()])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: the devices hold nothing of the operating system."""
+
+    def advance(self, until_ns: int) -> None:
+        """Advance all devices up to and including a time of `clock`; a past time changes nothing."""
+        while self.clock.step(until_ns * 1e-9):
+            pass
+
+    def open_link(self, name: str) -> Link:
+        """Open the host's end of a device's link; raises LinkError if it is open already."""
+        kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}
+        kind = self._devices[name].link
+        link = kinds.get(kind, VirtualByteLink)(name, self.clock, self._lines[name])
+        return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
+
+    def opener(self, name: str) -> Callable[[], Link]:
+        """Return the function that opens the host's end of a device's link, for DriverSettings."""
+        return partial(self.open_link, name)
 
 
 class _VirtualLink(Link):

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tactbench.plugin import (
-    Acquisition,
     Block,
     PlanEntry,
     Rig,
@@ -112,13 +111,11 @@ class Bench(Rig):
         """
         file = with_sensor(self._file, sensor.name).checked_for_one_clock()
         with ExitStack() as stack:
-            simulated: Acquisition | None = None
+            simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
             emulators = SceneEmulators(file, self._registry)
             clock: Clock = time.monotonic_ns
             advance, links = None, {}
-            if self._physics is not None:
-                simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
-            if simulated is not None and file.emulated:
+            if file.emulated:
                 emulators.prepare(simulated, sensor, scene, seed)
                 emulated = stack.enter_context(EmulatedDevices(emulators.devices))
                 clock, advance = emulated.clock, emulated.advance
@@ -143,15 +140,14 @@ class Bench(Rig):
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
             )
             emulators.begin(clock() * 1e-9)
-            if self._physics is not None:
-                self._physics.begin()
-            drawn: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
+            self._physics.begin()
+            drawn: dict[str, Scalar] = dict(simulated.drawn)
             drawn |= {f"{name} {key}": value for name, about in identity.items() for key, value in about.items()}
             yield BenchAcquisition(
                 streams=drivers[sensor.name].streams,
                 reference=() if force is None else force.streams,
-                plan=() if simulated is None else simulated.plan,
-                assumptions={} if simulated is None else simulated.assumptions,
+                plan=simulated.plan,
+                assumptions=simulated.assumptions,
                 drawn=drawn if force is None else drawn | force.about(),
                 reading=reading,
                 duration_s=duration_s,

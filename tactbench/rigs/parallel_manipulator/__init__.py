@@ -32,7 +32,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             title="linear motor on a Faulhaber drive, ASCII by RS232",
             kind="motor",
             driver=f"{here}.motor.driver:FaulhaberDriver",
-            emulator=f"{here}.motor.emulator:build",
+            emulator=f"{here}.motor.emulator:MotorEmulator",
             emulated_link="bytes",
         ),
     ]

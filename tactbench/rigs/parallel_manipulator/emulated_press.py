@@ -11,17 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tactbench.plugin import Acquisition, NotApplicable, Scene, SensorDescriptor
 from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, with_limits
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import EmulatedDevice
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, with_limits
 
 FORCE = "fz"
 """Channel name of the pressing force in a simulated rig and in emulated force sensors."""
@@ -30,9 +27,6 @@ FLOOR_N = 0.6e-3
 rms of Fz); without it a sensor without noise would seem stuck."""
 BEYOND_M = 1.0
 """Length of the linear spring beyond the press curve's end [m]: at least the travel of any motor."""
-_FLOOR_DRAWS = 1 << 14
-_FLOOR_HZ = 7000
-"""Rate of new noise values [Hz]: one for each sample of a Net F/T box."""
 
 
 def quiet(scene: Scene) -> Scene:
@@ -90,7 +84,7 @@ class EmulatedPress:
         streams = (*simulated.streams, *simulated.reference)
         self._samples = SceneSamples(streams, simulated, self._duration_s, rest_s=self._hold_s)
         self._samples.start(0.0)
-        self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
+        self._rng = rng
 
     def start(self, at_s: float) -> None:
         """Let the scene's time begin at `at_s` of the devices' clock [s]."""
@@ -111,8 +105,7 @@ class EmulatedPress:
             at_s = min(self._hold_s + force_n * self._s_per_n, last_s)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
-        floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
-        return {**self._samples(at_s), FORCE: force_n + noise_n + floor}
+        return {**self._samples(at_s), FORCE: force_n + noise_n + FLOOR_N * self._rng.standard_normal()}
 
 
 class PressEmulators(RigEmulators):
@@ -131,18 +124,13 @@ class PressEmulators(RigEmulators):
         """Press of the present scene; None: no sensor is pressed."""
         self.pushed_n = 0.0
         """Force of a push by hand on the force sensor [N], added to that of the skin."""
-        self._motor: Any = None
-        devices: dict[str, EmulatedDevice] = {}
-        for sensor in file.sensors:
+        self.devices: dict[str, Any] = {}
+        for sensor in file.sensors:  # which share force sensor and axes
             own = emulators_of(with_sensor(limited, sensor), registry, sensor, self._sensed)
-            devices |= {name: device for name, device in own.items() if name not in devices}
-        self.devices = devices
-        for name in axes_of(self._settings):
-            axis: Any = devices[name].emulator if name in devices else None
-            if axis is not None:  # the platform's weight is not modelled
-                axis.press_against(self._force_n if name == MOTOR else None)
-            if name == MOTOR:
-                self._motor = axis
+            self.devices = {**own, **self.devices}
+        self._motor = self.devices[MOTOR].emulator if MOTOR in self.devices else None
+        if self._motor is not None:  # the platform's weight on its rails is not modelled
+            self._motor.press_against(self._force_n)
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Put the sensor of a scene below the motor; the height of its skin is drawn at random."""

@@ -106,9 +106,6 @@ class LinearDelta(Options):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        apart = np.abs(np.diff([*self.azimuth_deg, self.azimuth_deg[0] + 360.0]) % 360.0)
-        if apart.min() < 1.0 or apart.max() > 359.0:
-            raise ValueError("two legs have the same azimuth_deg; give different angles")
         if (self.joint_range[0] >= self.joint_range[1]).any():
             raise ValueError("joint_lowest_mm must be below joint_highest_mm")
         return self

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain
 from typing import TYPE_CHECKING
 from weakref import finalize
 
@@ -42,13 +41,12 @@ from tactbench.plugin.devices import (
     StreamCounts,
     ask_operator,
     physics_of,
-    read_options,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
 from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.session import Session
-from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, with_limits
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, axis_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import Clock, ScenePhysics
@@ -87,13 +85,13 @@ class PressAcquisition:
         """Yield blocks of sensor, force sensor and motor until the scene is over; then unload it and retreat."""
         end_ns = self.begin_ns + round(1e9 * self.duration_s)
         for block in self.blocks:
-            yield from self._within(chain((block,), self.control.blocks()), end_ns)
+            yield from self._within((block, *self.control.blocks()), end_ns)
             if self.control.press.over or (self.clock() >= end_ns and self.reading.ended):
                 break
         yield from self._within(self.control.blocks(), end_ns)
         self.events += self.control.events()
 
-    def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
+    def _within(self, blocks: Iterable[Block], end_ns: int) -> Iterator[Block]:
         for block in blocks:
             assert block.t_ns is not None
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
@@ -106,11 +104,10 @@ class PressAcquisition:
 
         A further interrupt does not stop the retreat.
         """
-        waiting = True
-        while waiting:
+        while True:
             with suppress(KeyboardInterrupt):
                 self.control.retreat(why, self.retreat_s)
-                waiting = False
+                break
         self.events += self.control.events()
         return self.control.press.not_out
 
@@ -150,9 +147,8 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Reason for an early end of the scene; empty: no early end."""
-        press, late = self.control.press, self.control.late
-        reason = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
-        return "; ".join(filter(None, (reason, press.not_out))) or self.reading.ended
+        press = self.control.press
+        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):
@@ -170,7 +166,7 @@ class ParallelManipulator(Rig):
     operator
         Access to the person who mounts the caps; not needed if all devices are emulated.
     physics
-        Simulation of the scenes for emulated devices; None: no device is emulated.
+        Simulation of the scenes for emulated devices.
 
     Raises
     ------
@@ -178,12 +174,12 @@ class ParallelManipulator(Rig):
         If the settings lack a value or contradict each other. :func:`build` refuses the same files as `doctor`.
     """
 
-    def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
+    def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics) -> None:
         self._file, self._operator, self._physics, self._registry = file, operator, physics, load_registry()
         self._session: Session | None = None
         limited, self.settings = with_limits(file, self._registry)
-        kind, options = positioner_of(self._registry, MOTOR, limited.devices[MOTOR])
-        self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
+        kind, options = axis_of(self._registry, MOTOR, limited.devices[MOTOR])
+        self._facts = kind.facts_of(options)
 
     def close(self) -> None:
         """End the session, if one is open: disarm the guard and close all devices."""
@@ -210,14 +206,12 @@ class ParallelManipulator(Rig):
         xy_m = self._place_m(scene)
         try:
             with ExitStack() as stack:
-                simulated: Acquisition | None = None
-                if self._physics is not None:
-                    simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+                simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
                 if self._session is None:
                     self._session = session = Session(file if file.emulated else self._file, self._registry)
                     # For a program that forgets this object, or ends.
                     self._finish = finalize(self, session.close)
-                if self._session.emulators is not None and simulated is not None:
+                if self._session.emulators is not None:
                     self._session.emulators.prepare(simulated, sensor, scene, seed)
                 yield self._pressing(stack, self._session, sensor, scene, simulated, xy_m)
         except BaseException:
@@ -244,7 +238,7 @@ class ParallelManipulator(Rig):
         session: Session,
         sensor: SensorDescriptor,
         scene: Scene,
-        simulated: Acquisition | None,
+        simulated: Acquisition,
         xy_m: tuple[float, float],
     ) -> PressAcquisition:
         """Return the scene's recording, ready to begin; `stack` closes the scene's own devices."""
@@ -263,22 +257,13 @@ class ParallelManipulator(Rig):
         identity = {**session.identity, sensor.name: driver.identify()}
         force, limits = session.measured_limits()
         press = Press(settings.press_plan(facts.resolution, guard.force_stream), _course(scene))
-        control: Control | None = None
-
-        def carry(until_ns: int) -> None:
-            if control is not None:
-                control.carry(until_ns)
-
-        reading = stack.enter_context(
-            Reading({sensor.name: driver}, clock=clock, advance=None if emulators is None else carry)
-        )
-
-        def received() -> int:
-            return sum(one.received for one in reading.stream_counts.values())
-
+        control: Control  # made below: it counts the rows of the reading that it advances
+        advance = None if emulators is None else lambda until_ns: control.carry(until_ns)
+        reading = stack.enter_context(Reading({sensor.name: driver}, clock=clock, advance=advance))
         stack.callback(_disarm, session)
         control = Control(
-            guard, limits, guard.arm(limits), press, received, clock,
+            guard, limits, guard.arm(limits), press,
+            lambda: sum(one.received for one in reading.stream_counts.values()), clock,
             period_s=1 / settings.force_loop.rate_hz, stale_s=1e-3 * settings.press.stale_ms,
         )  # fmt: skip
         stack.callback(control.stop)
@@ -286,7 +271,7 @@ class ParallelManipulator(Rig):
             control.start()
         blocks = reading.blocks(math.inf, lambda: press.over)  # a silent sensor yields no block
         events = _find_surface(control, blocks)
-        about: dict[str, Scalar] = {} if simulated is None else dict(simulated.drawn)
+        about: dict[str, Scalar] = dict(simulated.drawn)
         about |= {f"{name} {key}": value for name, values in identity.items() for key, value in values.items()}
         about |= {
             **force.about(),
@@ -301,8 +286,8 @@ class ParallelManipulator(Rig):
         found = PressAcquisition(
             streams=driver.streams,
             reference=(*force.streams, guard.motor_stream),
-            plan=() if simulated is None else simulated.plan,
-            assumptions={} if simulated is None else simulated.assumptions,
+            plan=simulated.plan,
+            assumptions=simulated.assumptions,
             about=about,
             force=force,
             control=control,
@@ -315,8 +300,7 @@ class ParallelManipulator(Rig):
         )
         if emulators is not None:
             emulators.begin(1e-9 * found.begin_ns)
-        if self._physics is not None:
-            self._physics.begin()
+        self._physics.begin()
         press.begin(1e-9 * found.begin_ns)
         return found
 

@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
-from tactbench.plugin.devices import CheckTable, PositionerFacts, RigCheck, RigFile, largest_force_n, read_options
+from tactbench.plugin.devices import CheckTable, LoopModel, PositionerFacts, RigCheck, RigFile, largest_force_n
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, check_move, links, solve_inverse, way
-from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.settings import (
-    JOINTS,
-    MOTOR,
-    RigSettings,
-    axes_of,
-    positioner_of,
-    with_limits,
-)
+from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, RigSettings, axes_of, axis_of, with_limits
 
 LOOK_S = 7e-3
 """Time of one check by the guard, with scheduling delay [s]: part of a reaction, besides the age of the force and the
 axis' latency."""
-INCREMENT_BYTES = 65
-"""Number of bytes on the line for an increment, the polls that confirm its end, and their answers: LA-12345, OK, M, OK,
-TPOS, -12345, POS, -12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
 MOST_OF_LIMIT = 0.5
 """Largest permitted part of the largest stable gain: the rest is for overshoot and skins stiffer than declared."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m", "orientation")
@@ -42,7 +29,7 @@ def check(file: RigFile) -> RigCheck:
     Raises
     ------
     UsageError, UnknownNameError
-        If the file lacks a value, or a device in it is not installed.
+        If the file lacks a value, has one that a drive does not support, or a device in it is not installed.
     """
     registry = load_registry()
     file, settings = with_limits(file, registry)
@@ -50,42 +37,26 @@ def check(file: RigFile) -> RigCheck:
     facts: dict[str, PositionerFacts] = {}
     most_n: dict[str, float] = {}
     axes: list[tuple[str, ...]] = []
-
-    def refusing(do: Callable[[], object]) -> None:
-        """Call `do`; add an error that it raises to the problems."""
-        try:
-            do()
-        except TactbenchError as error:
-            problems.append(str(error))
-
     for name in axes_of(settings):
-        kind, given = positioner_of(registry, name, file.devices[name])
-        options = read_options(kind.options_kind, given, name)
+        kind, options = axis_of(registry, name, file.devices[name])
         most_n[name] = math.inf if options.largest_force_n is None else options.largest_force_n
         of_axis = _axis_problems(settings, name, options)
         try:
             facts[name] = kind.facts_of(options)
+            for speed_mm_s in (settings.touch.touch_speed_mm_s, settings.press.unload_speed_mm_s):
+                kind.facts_of(options.model_copy(update={"speed_m_s": 1e-3 * speed_mm_s} if name == MOTOR else {}))
         except RigError as error:
             raise UsageError(" ".join([f"{name}: {error.message}", *of_axis]), hint=error.hint) from error
         problems += of_axis
         axes.append((name, *_axis_row(options)))
-        if name == MOTOR and isinstance(options, FaulhaberOptions):
-            for speed_mm_s in settings.speeds_mm_s:
-                refusing(partial(options.speed, 1e-3 * speed_mm_s))
-            problems += _line_problems(settings, options)
     forces, found = _forces(settings, facts, most_n[MOTOR])
     problems += found
-    loop = settings.force_loop.model(settings.limits.travel_mm)
-    used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
-    if used > MOST_OF_LIMIT:
-        problems.append(
-            f"The force loop's gains are {used:.2f} of the largest stable gains at the greatest stiffness; at most "
-            f"{MOST_OF_LIMIT:g} is permitted. Divide both gains by {used / MOST_OF_LIMIT:.2f} or more."
-        )
-    share = ("share of the largest stable gains", f"{used:.2f}, at most {MOST_OF_LIMIT:g}")
     delta = settings.manipulator
     if isinstance(delta, LinearDelta):
-        refusing(partial(_check_places, delta, settings))
+        try:
+            _check_places(delta, settings)
+        except TactbenchError as error:
+            problems.append(str(error))
         together_n = _together_n(delta, settings, [most_n[name] for name in JOINTS])
         if math.isfinite(together_n):
             sources = ", ".join(dict.fromkeys(source for name, _, _, source, _ in axes if name in JOINTS))
@@ -93,7 +64,7 @@ def check(file: RigFile) -> RigCheck:
             problems += _too_strong(f"{', '.join(JOINTS)} together", together_n, settings)
     tables = (
         CheckTable("axes", ("axis", "stands", "largest force", "by", "units that are ASSUMED"), tuple(axes)),
-        CheckTable("largest forces, and the force loop", ("what", "value"), (*forces, share)),
+        CheckTable("largest forces, and the force loop", ("what", "value"), tuple(forces)),
     )
     return RigCheck(tables, tuple(problems), file, settings.limits.travel_ceiling_n)
 
@@ -139,24 +110,16 @@ def _too_strong(what: str, force_n: float, settings: RigSettings) -> list[str]:
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     force_n: float | None = options.largest_force_n
-    step_m, corridor_m = settings.force_loop.step_m, options.corridor_m
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]
     if force_n is None:
         missing.append("peak_force_n (or peak current and force constant)")
-    elif isinstance(options, FaulhaberOptions) and options.current_limit_a is None:
-        missing.append("force_constant_n_a, without which no limit for the declared force is sent to the drive")
     problems = [] if force_n is None else _too_strong(f"The {name}'s drive", force_n, settings)
     if missing:
         problems.append(f"The options of {name} lack {', '.join(missing)}; state them in the rig file.")
     skin, away = (1, "negative") if name == MOTOR else (-1, "positive")
     if options.homes_towards() == skin:
         problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s {away}.")
-    if name == MOTOR and corridor_m is not None and corridor_m > step_m:
-        problems.append(
-            f"The motor's moves end within {1e6 * corridor_m:g} um, and the largest increment is {1e6 * step_m:g} um. "
-            "Lower corridor_m, or raise the loop's speed."
-        )
     return problems
 
 
@@ -173,18 +136,6 @@ def _axis_row(options: Any) -> tuple[str, ...]:
     )
 
 
-def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str]:
-    """Return a problem if sending an increment to the motor takes longer than assumed for the force loop."""
-    loop, exchange_ms = settings.force_loop, 1e3 * line_time_s(INCREMENT_BYTES, options.baud)
-    allowed_ms = 1e3 / loop.rate_hz + loop.delay_ms
-    if exchange_ms <= allowed_ms:
-        return []
-    return [
-        f"One increment takes {exchange_ms:.1f} ms on the line; control period and declared delay are "
-        f"{allowed_ms:g} ms together. Lower rate_hz, raise delay_ms, or raise baud."
-    ]
-
-
 def _forces(
     settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float
 ) -> tuple[list[tuple[str, str]], list[str]]:
@@ -193,14 +144,15 @@ def _forces(
     A reaction is assumed as late as the rig file permits: at the largest age of the force that the guard accepts.
     """
     limits, touch, stiffness, motor = settings.limits, settings.touch, settings.stiffness, facts[MOTOR]
+    loop = settings.force_loop
     age_s = 1e-3 * limits.force_age_ms
     react_s = age_s + LOOK_S + motor.stop_latency_s
     slow, acceleration = 1e-3 * touch.touch_speed_mm_s, 1e-3 * touch.acceleration_mm_s2
     k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
-    by_step = limits.force_ceiling_n + k * (settings.force_loop.step_m + motor.corridor)
+    by_step = limits.force_ceiling_n + k * (loop.step_m + motor.corridor)
     by_approach = largest_force_n(limits.force_ceiling_n, k, slow, acceleration, react_s)
     # A control period, and the mean of a rising force is half its time behind; or three single samples.
-    behind_s = 1 / settings.force_loop.rate_hz + 0.5e-3 * touch.mean_ms
+    behind_s = 1 / loop.rate_hz + 0.5e-3 * touch.mean_ms
     first = min(
         largest_force_n(touch.mean_n, soft, slow, acceleration, react_s + behind_s),
         largest_force_n(touch.single_n, soft, slow, acceleration, react_s + 3e-3),
@@ -213,8 +165,11 @@ def _forces(
     # The way until a force that reads wrong is noticed: of the approach, and on the ramp (see `devices.press`).
     way_m = max(
         settings.found_m - settings.surface_m + 1e-3 * settings.heights.tolerance_mm,
-        2 * settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
+        2 * settings.touch_way_m + 1e-6 * touch.mean_ms * loop.speed_mm_s,
     )
+    delay_s = 1e-3 * loop.delay_ms
+    model = LoopModel.around(loop.law(limits.travel_mm), lag_s=1e-3 * loop.motor_lag_ms, delay_s=delay_s)
+    used = 1e3 * stiffness.greatest_n_mm / model.largest_stiffness()
     rows = [
         (
             "reaction",
@@ -229,17 +184,23 @@ def _forces(
         ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
         *([("of a rail that moves down onto an object", f"{max(rails):.2f} N")] if rails else ()),
+        ("share of the largest stable gains", f"{used:.2f}, at most {MOST_OF_LIMIT:g}"),
     ]
-    problems = []
     largest = max(by_step, by_approach, *rails)
-    if not largest <= limits.rated_force_n:  # also refuses what is not a number
-        problems.append(
-            f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower "
-            "the speed, the ceiling, force_age_ms or the approach's threshold, or speed the line up."
-        )
-    if not first <= touch.allowed_n:
-        problems.append(
-            f"The first touch may come to {first:.2f} N; {touch.allowed_n:g} N are allowed. Lower touch_speed_mm_s, "
-            "mean_n or mean_ms."
-        )
-    return rows, problems
+    sound = {
+        f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower the "
+        "speed, the ceiling, force_age_ms or the approach's threshold, or speed the line up.": (
+            largest <= limits.rated_force_n
+        ),
+        f"The first touch may come to {first:.2f} N; {touch.allowed_n:g} N are allowed. Lower touch_speed_mm_s, mean_n "
+        "or mean_ms.": first <= touch.allowed_n,
+        f"The motor follows a command after up to {1e3 * motor.stop_latency_s:.1f} ms; control period and delay_ms are "
+        f"{1e3 / loop.rate_hz + loop.delay_ms:g} ms together. Lower rate_hz, raise delay_ms, or speed the line up.": (
+            motor.stop_latency_s <= 1 / loop.rate_hz + delay_s
+        ),
+        f"The force loop's gains are {used:.2f} of the largest stable gains at the greatest stiffness; at most "
+        f"{MOST_OF_LIMIT:g} is permitted. Divide both gains by {used / MOST_OF_LIMIT:.2f} or more.": (
+            used <= MOST_OF_LIMIT
+        ),
+    }
+    return rows, [problem for problem, holds in sound.items() if not holds]  # not a number: it does not hold

@@ -104,14 +104,13 @@ class Session:
         if self.emulated is not None:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
             return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
-        entries: dict[str, Any] = {**self._file.devices, FORCE: self._file.force}
-        settings = {}
-        for name in (*names, FORCE):
-            entry = entries[name]
-            settings[name] = DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
-        force_settings = settings.pop(FORCE)
+        devices = {
+            name: DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+            for name, entry in {**self._file.devices, FORCE: self._file.force}.items()
+            if entry is not None
+        }
         log = str(Path(self.settings.guard_log).expanduser().resolve())
-        return GuardProcess(ProcessSettings(settings, force_settings, log))
+        return GuardProcess(ProcessSettings({name: devices[name] for name in names}, devices[FORCE], log))
 
     # The beginning of a scene -----------------------------------------------------------------------------------------
 

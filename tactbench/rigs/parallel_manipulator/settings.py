@@ -13,7 +13,6 @@ from pydantic import Field, model_validator
 from tactbench.plugin import StreamSpec, UsageError, load_object
 from tactbench.plugin.devices import (
     ForceLaw,
-    LoopModel,
     NamedDevice,
     Options,
     Positioner,
@@ -40,12 +39,6 @@ NotNegative = Annotated[float, Field(ge=0)]
 Range = tuple[float, float]
 
 
-def _rising(names: str, *numbers: float) -> None:
-    """Raise ValueError if a number is below the number before it."""
-    if list(numbers) != sorted(numbers):
-        raise ValueError(f"{names} must rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
-
-
 class SafetyLimits(Options):
     """Limits of force, time and travel that are enforced by the guard."""
 
@@ -69,14 +62,6 @@ class SafetyLimits(Options):
     """Position of the motor away from the skin, where it waits and to which it retreats."""
     retreat_speed_mm_s: Positive
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        low, high = self.travel_mm
-        _rising("least travel_mm, retreat_mm and greatest travel_mm", low, self.retreat_mm, high)
-        ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
-        _rising("travel_ceiling_n, force_ceiling_n and rated_force_n", *ceilings)
-        return self
-
 
 class Stiffness(Options):
     """Stiffness of skin, cap and machine in series, N/mm; declared, since it cannot be computed beforehand."""
@@ -90,12 +75,6 @@ class Stiffness(Options):
     """Stiffness at the largest commanded force on the stiffest cap, where the force loop must be stable."""
     at_ceiling_n_mm: Positive
     """Stiffness at the force ceiling, where a late reaction adds force."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        stiffnesses = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
-        _rising("softest_n_mm, at_touch_n_mm, greatest_n_mm and at_ceiling_n_mm", *stiffnesses)
-        return self
 
 
 class ForceControl(Options):
@@ -133,10 +112,6 @@ class ForceControl(Options):
             travel=(1e-3 * travel_mm[0], 1e-3 * travel_mm[1]),
             feed_forward=math.inf if self.feed_forward_n_mm is None else 1e3 * self.feed_forward_n_mm,
         )
-
-    def model(self, travel_mm: Range) -> LoopModel:
-        """Return the model of the force loop, with the motor's travel [mm]."""
-        return LoopModel.around(self.law(travel_mm), lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
 
 class Touch(Options):
@@ -196,11 +171,6 @@ class Heights(Options):
     depth_mm: Positive
     """Greatest depth of the motor below the expected surface."""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        _rising("tolerance_mm, stand_off_mm and clearance_mm", self.tolerance_mm, self.stand_off_mm, self.clearance_mm)
-        return self
-
     @property
     def stand_off_m(self) -> float:
         """Height of the manipulator while the motor presses [m]."""
@@ -213,13 +183,14 @@ class Heights(Options):
 
 
 class Places(Options):
-    """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets."""
+    """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets.
+
+    The manipulator's x is the sensor's: state `azimuth_deg` of the legs from there.
+    """
 
     x_mm: float = 0.0
     """Manipulator's x (next: y) with the indenter above the nominal contact point."""
     y_mm: float = 0.0
-    turned_deg: float = 0.0
-    """Direction of the sensor's x in the manipulator's plane; the sensor's s is 90 deg further."""
     reach_x_mm: Range = (0.0, 0.0)
     """Permitted offsets of scenes along the sensor; the whole rectangle is tested beforehand."""
     reach_s_mm: Range = (0.0, 0.0)
@@ -227,10 +198,7 @@ class Places(Options):
 
     def place_m(self, x_mm: float, s_mm: float) -> tuple[float, float]:
         """Return the manipulator's x and y [m] for offsets on the sensor."""
-        turned = math.radians(self.turned_deg)
-        x = self.x_mm + math.cos(turned) * x_mm - math.sin(turned) * s_mm
-        y = self.y_mm + math.sin(turned) * x_mm + math.cos(turned) * s_mm
-        return 1e-3 * x, 1e-3 * y
+        return 1e-3 * (self.x_mm + x_mm), 1e-3 * (self.y_mm + s_mm)
 
     def corners_m(self) -> list[tuple[float, float]]:
         """Return the manipulator's x and y [m] at the four corners of the reach, in turn."""
@@ -256,10 +224,15 @@ class RigSettings(Options):
     @model_validator(mode="after")
     def _together(self) -> Self:
         limits, loop, touch, heights = self.limits, self.force_loop, self.touch, self.heights
+        stiffness, ceilings = dict(self.stiffness), (limits.travel_ceiling_n, limits.force_ceiling_n)
         least_ms = 1e3 * max(BEATS / loop.rate_hz, LEAST_HEARTBEAT_S)
         deepest_mm = limits.retreat_mm + heights.stand_off_mm + heights.depth_mm
         found_mm = 1e3 * (self.found_m - self.surface_m)
         for names, *numbers in (
+            ("travel_ceiling_n, force_ceiling_n and rated_force_n", *ceilings, limits.rated_force_n),
+            (", ".join(stiffness), *stiffness.values()),
+            ("tolerance_mm and stand_off_mm", heights.tolerance_mm, heights.stand_off_mm),
+            ("stand_off_mm and clearance_mm", heights.stand_off_mm, heights.clearance_mm),
             ("three control periods (20 ms at least) and heartbeat_ms", least_ms, limits.heartbeat_ms),
             ("a control period and mean_ms", 1e3 / loop.rate_hz, touch.mean_ms),
             ("contact_n and mean_n", touch.contact_n, touch.mean_n),
@@ -269,14 +242,9 @@ class RigSettings(Options):
             ("retreat_mm + stand_off_mm + depth_mm, and the greatest travel_mm", deepest_mm, limits.travel_mm[1]),
             ("depth of the touch on the softest skin (mean_n/softest_n_mm) and depth_mm", found_mm, heights.depth_mm),
         ):
-            _rising(names, *numbers)
+            if numbers != sorted(numbers):
+                raise ValueError(f"{names} must rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
         return self
-
-    @property
-    def speeds_mm_s(self) -> tuple[float, ...]:
-        """All speeds of the motor in the settings."""
-        touch = self.touch
-        return (touch.speed_mm_s, touch.touch_speed_mm_s, self.press.unload_speed_mm_s, self.limits.retreat_speed_mm_s)
 
     @property
     def surface_m(self) -> float:
@@ -345,7 +313,7 @@ def axes_of(settings: RigSettings) -> tuple[str, ...]:
     return (MOTOR,) if settings.manipulator == "fixed" else (MOTOR, *JOINTS)
 
 
-def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Positioner], dict[str, Any]]:
+def axis_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Positioner], Any]:
     """Return the class of an axis' driver, and its options; raises UsageError if it is not a Positioner."""
     descriptor = registry.devices[entry.device]
     kind: Any = load_object(descriptor.driver)
@@ -353,7 +321,8 @@ def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Po
         raise UsageError(
             f"The {name}, {entry.device}, is no axis.", hint="Its DeviceDescriptor's driver must be a Positioner."
         )
-    return kind, {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
+    given = {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
+    return kind, read_options(kind.options_kind, given, name)
 
 
 def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
@@ -362,26 +331,26 @@ def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
     Raises
     ------
     UsageError
-        As in :func:`settings_of`, and if the motor's options state a limit a second time.
+        As in :func:`settings_of`, and if the motor's options state a limit a second time, or the limits are not valid.
     """
     settings, entry = settings_of(file), file.devices[MOTOR]
-    limits = settings.limits
+    limits, touch = settings.limits, settings.touch
     own = {
         "lower_m": 1e-3 * limits.travel_mm[0],
         "upper_m": 1e-3 * limits.travel_mm[1],
         "retreat_m": 1e-3 * limits.retreat_mm,
         "retreat_speed_m_s": 1e-3 * limits.retreat_speed_mm_s,
-        "speed_m_s": 1e-3 * settings.touch.speed_mm_s,
-        "acceleration_m_s2": 1e-3 * settings.touch.acceleration_mm_s2,
+        "speed_m_s": 1e-3 * touch.speed_mm_s,
+        "acceleration_m_s2": 1e-3 * touch.acceleration_mm_s2,
     }
-    kind, options = positioner_of(registry, MOTOR, entry)
-    if "homing" in kind.options_kind.model_fields and options.get("homing", "here") == "here":
+    _, options = axis_of(registry, MOTOR, entry)
+    if getattr(options, "homing", "") == "here":
         own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
     if twice := [name for name in own if name in entry.options]:
         raise UsageError(
             f"The motor's {', '.join(twice)} is stated in its options.",
             hint="State it once, under `settings: limits:` and `touch:`.",
         )
-    read_options(kind.options_kind, {**options, **own}, entry.device)
     motor = entry.model_copy(update={"options": {**entry.options, **own}})
+    axis_of(registry, MOTOR, motor)
     return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}}), settings

@@ -32,9 +32,9 @@ def tactbench_effects() -> list[EffectDescriptor]:
     return [
         _effect("force-loop", "Motor under force control", "effects.force_loop:apply", "", "load reference-force"),
         _effect("contact", "Normal contact", "contact.stages:press_skin", "load core", "skin"),
-        _effect("core", "Touch-down on the core", "contact.core:with_core", "", "core"),
-        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", "skin", "dc_pressure fluid"),
-        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", "", "shear"),
+        _effect("core", "Touch-down on the core", "contact.shell:with_core", "", "core"),
+        _effect("fluid-pressure", "Fluid pressure", "contact.press:Press", "skin", "dc_pressure fluid"),
+        _effect("shear", "Tangential state of the skin", "contact.tangential:tangential_of", "", "shear"),
         _channels("gain", "Scatter of gains", produces="gain"),
         _effect("creep", "Creep of the skin", "effects.creep:apply", "load skin gain", "effective-force"),
         _effect(
@@ -63,7 +63,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("friction", "Friction", "effects.friction:apply", "skin", "slip tangential-force reference-force"),
         _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", "slip skin", "vibration"),
         _effect(
-            "ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", "skin fluid vibration",
+            "ac-pressure", "Dynamic pressure", "effects.skin_vibration:ac_pressure", "skin fluid vibration",
             "ac_pressure reading",
         ),
         _channels("hum", "Hum of dynamic pressure", group="noise"),
@@ -104,7 +104,7 @@ def tactbench_indenters() -> list[IndenterDescriptor]:
 
 
 def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescriptor:
-    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
+    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.geometry:{name}", dimensions=dimensions)
 
 
 def _effect(name: str, title: str, where: str, consumes: str, produces: str, group: str = "") -> EffectDescriptor:

@@ -28,8 +28,8 @@ STORED = "stored"
 """Name of the result "stored samples", which every recording needs."""
 REFERENCE = "reference-force"
 """Name of the result "reference force", which every recording needs."""
-LENT = "core"
-"""Name of the result of effects that the contact solver itself applies when a load needs them."""
+LENT = ("core", "fluid-pressure", "shear")
+"""Names of the effects that the contact solver itself applies, or applies when a load needs them."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Plan:
     """Included effects in the order of application, followed by the effects left out."""
     stages: tuple[EffectDescriptor, ...]
     """Descriptors of the effects to apply, in order."""
-    lent: Mapping[str, str]
-    """Effects that the contact solver may apply: name -> ``module:callable``."""
+    lent: frozenset[str]
+    """Names of the included effects that the contact solver applies."""
 
     def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
         """Return the entries, after replacing those that could be decided only after the contact was solved."""
@@ -72,7 +72,14 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
         taken = signed.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
-        entries[effect.name] = _entry(effect, reason, taken, asked=effect.name in signed)
+        asked, text, change = effect.name in signed, reason.text, reason.change
+        if asked and (taken or reason.called_for):
+            text = f"{'included' if taken else 'left out'} as stated; else: {text}"
+        if reason.called_for and not taken:
+            change = None  # what an effect would have changed that was called for is no bound any more
+        entries[effect.name] = PlanEntry(
+            effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked
+        )
     for kind in kinds:
         if not any(kind in effect.produces for effect in included):
             without = [name for name, taken in signed.items() if not taken]
@@ -86,8 +93,8 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     return Plan(
         kinds=kinds,
         entries=tuple(entries[effect.name] for effect in (*ordered, *left_out)),
-        stages=tuple(effect for effect in ordered if LENT not in effect.produces),
-        lent={effect.name: effect.where for effect in ordered if LENT in effect.produces},
+        stages=tuple(effect for effect in ordered if effect.name not in LENT),
+        lent=frozenset(effect.name for effect in ordered).intersection(LENT),
     )
 
 
@@ -116,25 +123,6 @@ def _signed(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool
     return signed
 
 
-def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reason:
-    reason = load_object(effect.called_for)(scene, sensor)
-    if not isinstance(reason, Reason):
-        raise PluginContractError(
-            f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
-            hint="Return tactbench.plugin.Reason(called_for, text).",
-        )
-    return reason
-
-
-def _entry(effect: EffectDescriptor, reason: Reason, taken: bool, *, asked: bool) -> PlanEntry:
-    text = f"included as stated; else: {reason.text}" if asked and taken else reason.text
-    if asked and not taken:
-        text = f"left out as stated; else: {reason.text}" if reason.called_for else reason.text
-    # An effect that was called for and is left out all the same: what it would have changed is no bound any more.
-    change = None if asked and not taken and reason.called_for else reason.change
-    return PlanEntry(effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked)
-
-
 def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     present = {channel.kind for channel in sensor.channels()}
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
@@ -153,7 +141,14 @@ def _needed(
 
     Only an included effect makes the tokens that it consumes needed.
     """
-    reasons = {effect.name: _reason(effect, scene, sensor) for effect in effects}
+    reasons: dict[str, Reason] = {}
+    for effect in effects:
+        reasons[effect.name] = reason = load_object(effect.called_for)(scene, sensor)
+        if not isinstance(reason, Reason):
+            raise PluginContractError(
+                f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
+                hint="Return tactbench.plugin.Reason(called_for, text).",
+            )
     taking = [effect for effect in effects if signed.get(effect.name, reasons[effect.name].called_for)]
     needed = tokens.union(*(effect.produces for effect in effects if signed.get(effect.name)))
     before: set[str] = set()

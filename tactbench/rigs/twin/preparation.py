@@ -19,9 +19,8 @@ from tactbench.plugin import (
     SensorSpec,
 )
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
-from tactbench.rigs.twin.geometry import Contact, radius_mm
+from tactbench.rigs.twin.geometry import Contact, radius_mm, shape_of
 from tactbench.rigs.twin.planner import Plan
-from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 _OWN_CLOCK_FROM = 2.0
@@ -58,7 +57,9 @@ def prepare(
     """
     check_numbers(scene)
     sensor = handled(sensor, scene)
-    t_s, load = _load(scene)
+    profile = scene.profile
+    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
+    load = Load(*(np.array(corner) for corner in profile.corners))
     run = Synthesis(
         sensor=sensor,
         scene=scene,
@@ -68,7 +69,7 @@ def prepare(
         tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0, shape=shape_of(scene.indenter, indenters)),
         reference_n=load.at(t_s),
-        lent=dict(plan.lent),
+        lent=plan.lent,
         forced=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
         fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
@@ -100,13 +101,6 @@ def carried_out(
     return run
 
 
-def _load(scene: Scene) -> tuple[FloatArray, Load]:
-    """Return the reference clock's times [s] and the commanded normal force, piecewise linear in time."""
-    profile = scene.profile
-    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (profile.duration.to("s") / profile.samples)
-    return t_s, Load(*(np.array(corner) for corner in profile.corners))
-
-
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
     """Yield the channels on the reference clock, followed by the channels of each stream with its own clock.
 
@@ -121,9 +115,14 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
         if stream.rate_hz is None or at_least <= stream.rate_hz < _OWN_CLOCK_FROM * slowest
     )
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
-        channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
-        if not channels:
+        kept = tuple(
+            stream.model_copy(update={"channels": wanted})
+            for stream in streams
+            if (wanted := tuple(channel for channel in stream.channels if channel.kind in plan.kinds))
+        )
+        if not kept:
             continue
+        channels = tuple(channel for stream in kept for channel in stream.channels)
         rate = streams[0].rate_hz if clock else None
         if rate is not None and not duration * rate <= MOST_SAMPLES:
             raise RigError(
@@ -133,6 +132,7 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
         own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
         yield Track(
             clock=clock,
+            streams=kept,
             channels=channels,
             t_s=own,
             force_n=load.at(own),

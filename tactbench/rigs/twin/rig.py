@@ -30,9 +30,9 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
+from tactbench.rigs.twin.geometry import shape_of
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
-from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
 _CURVE_POINTS = 4001
@@ -159,15 +159,12 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     streams: list[StreamSpec] = []
     blocks: list[Block] = []
     for track in run.tracks:
-        columns = {channel.name: column for column, channel in enumerate(track.channels)}
-        for stream in run.sensor.spec.streams:
-            kept = tuple(channel for channel in stream.channels if channel.name in columns)
-            if not kept:
-                continue
-            own = [columns[channel.name] for channel in kept]
-            clock = {} if track.clock else {"rate_hz": rate, "rate_source": _ONE_CLOCK}
-            streams.append(stream.model_copy(update={"channels": kept, **clock}))
-            stored = _stored(track.readings[:, own], stream, kept)
+        clock, end = {} if track.clock else {"rate_hz": rate, "rate_source": _ONE_CLOCK}, 0
+        for stream in track.streams:
+            own = slice(end, end + len(stream.channels))
+            end = own.stop
+            streams.append(stream.model_copy(update=clock))
+            stored = _stored(track.readings[:, own], stream)
             blocks.append(Block(stream.name, _ns(track.t_s), stored, track.quality[:, own]))
     more = {**run.reference_more, **_along_the_slide(run)}
     reference = StreamSpec(
@@ -272,16 +269,15 @@ def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:
     return np.round(t_s * 1e9).astype(np.int64)
 
 
-def _stored(readings: FloatArray, stream: StreamSpec, channels: tuple[ChannelSpec, ...]) -> npt.NDArray[np.generic]:
+def _stored(readings: FloatArray, stream: StreamSpec) -> npt.NDArray[np.generic]:
     dtype = np.dtype(stream.dtype)
     if dtype.kind == "f":
         return readings.astype(dtype)
     info = np.iinfo(dtype)
     if readings.size and (readings.min() < info.min or readings.max() > info.max):
-        worst = channels[int(np.argmax(np.abs(readings).max(axis=0)))].name
+        worst = stream.channels[int(np.argmax(np.abs(readings).max(axis=0)))].name
         raise RigError(
             f"Channel {worst} of stream {stream.name} leaves the range of {stream.dtype}.",
             hint="State lower and upper in the channel's spec, or a wider dtype in the stream's.",
         )
-    stored: npt.NDArray[np.generic] = np.rint(readings).astype(dtype)
-    return stored
+    return np.rint(readings).astype(dtype)

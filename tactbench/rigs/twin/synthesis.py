@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +18,7 @@ from tactbench.plugin import (
     Scalar,
     Scene,
     SensorDescriptor,
+    StreamSpec,
     load_object,
 )
 from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances, Skin
@@ -48,7 +49,7 @@ class Load:
 
     def at(self, t_s: FloatArray) -> FloatArray:
         """Return the (n,) normal force at (n,) seconds since the recording's first sample."""
-        return np.asarray(np.interp(t_s, self.t_s, self.force_n), dtype=np.float64)
+        return np.interp(t_s, self.t_s, self.force_n)
 
     @property
     def largest_n(self) -> float:
@@ -89,8 +90,10 @@ class Track:
 
     clock: str
     """Name of the stream that has this clock for itself; empty for the scene's reference clock."""
+    streams: tuple[StreamSpec, ...]
+    """The sensor's streams on this clock, limited to the recorded channels."""
     channels: tuple[ChannelSpec, ...]
-    """Channels in the order of the sensor's streams."""
+    """Channels of all these streams, in order."""
     t_s: FloatArray
     """(n,) seconds since the recording's first sample."""
     force_n: FloatArray
@@ -140,16 +143,12 @@ class Synthesis:
     contact: Contact
     reference_n: FloatArray
     """(n,) reading of the force sensor; equal to the true force until an effect changes it."""
-    fluid_pressure: bool = False
-    """True if an observed channel needs the pressure of the fluid."""
-    tangential: bool = False
-    """True if an observed channel needs the tangential state of the skin."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
     """Function from (n,) seconds to the tangential state; None if nothing slides."""
-    lent: dict[str, str] = field(default_factory=dict)
-    """Effects that the contact solver may apply: name -> ``module:callable``."""
+    lent: frozenset[str] = frozenset()
+    """Names of the effects that the contact solver applies."""
     settled: dict[str, Settled] = field(default_factory=dict)
     """Plan entries that were decided after the contact was solved, by name."""
     forced: frozenset[str] = frozenset()
@@ -164,15 +163,12 @@ class Synthesis:
     """Random draws and achieved accuracies, by name, that are stored with the recording."""
     spent_s: dict[str, float] = field(default_factory=dict)
     """Seconds spent on each applied effect."""
-    elsewhere_s: float = 0.0
-    """Seconds within the present effect that are counted under another effect."""
 
     def apply(self, effect: EffectDescriptor) -> None:
-        """Apply one effect to this recording, and add the seconds it takes to `spent_s`."""
-        began, self.elsewhere_s = time.perf_counter(), 0.0
+        """Apply one effect to this recording, and keep the seconds it takes in `spent_s`."""
+        began = time.perf_counter()
         load_object(effect.where)(self)
-        own = time.perf_counter() - began - self.elsewhere_s
-        self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
+        self.spent_s[effect.name] = time.perf_counter() - began
 
     def follow(self, load: Load) -> None:
         """Set the true normal force to `load`, on every clock and for the force sensor."""
@@ -186,6 +182,12 @@ class Synthesis:
         """The sensor's skin, which every simulated sensor has."""
         assert self.sensor.spec.skin is not None
         return self.sensor.spec.skin
+
+    def columns(self, kind: ChannelKind) -> Iterator[tuple[Track, int]]:
+        """Yield the recorded channels of a kind: their track, and their column in its readings."""
+        for track in self.tracks:
+            for column in track.by_kind().get(kind, []):
+                yield track, column
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
         """Return the nuisances of a kind of channel; None when the spec states none."""

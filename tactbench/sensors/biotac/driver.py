@@ -2,7 +2,7 @@
 
 **Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
 every byte. An SPI bridge (``spi://bridge/…``, a microcontroller that carries out batches by itself, ``docs/links.md``)
-keeps the time of 4400 words a second; the machine's own SPI (``spi://spidev/…``) does so less well.
+keeps the time of 4400 words a second.
 
 **Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
 4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`). Some batches are
@@ -29,7 +29,7 @@ the host too late for the next batch   its rows come later [batches late]; whole
 cable, port or bridge gone             the reading ends with LinkUnplugged
 =====================================  =================================================================================
 
-**Tested** against an emulator written from the same public sources, never with a real BioTac, bridge or spidev. Assumed
+**Tested** against an emulator written from the same public sources, never with a real BioTac or bridge. Assumed
 is above all that the sensor samples at the last bit of its command, that a property is read with the pause of a
 sampling command, and that a resend needs the same pause.
 """
@@ -63,8 +63,7 @@ from tactbench.sensors.biotac.codec import (
     property_command,
     property_text,
 )
-from tactbench.sensors.biotac.frames import FrameBatches, streams_of
-from tactbench.sensors.biotac.options import BioTacOptions
+from tactbench.sensors.biotac.frames import BioTacOptions, FrameBatches, streams_of
 
 PATIENCE_S = 0.5
 """Seconds (assumed) after the end of a batch until its reply counts as lost. USB and a busy host take less."""
@@ -76,7 +75,7 @@ class BioTacDriver(Driver):
     Parameters
     ----------
     settings
-        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.options.BioTacOptions`.
+        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.frames.BioTacOptions`.
 
     Raises
     ------
@@ -112,19 +111,13 @@ class BioTacDriver(Driver):
     def _set_up(self) -> None:
         """Reset the driver to frame position 0 and no pending batches."""
         options = self._options
-        try:
-            self._batches = FrameBatches(
-                options.frame,
-                speed_hz=self._link.speed_hz,
-                select=options.select,
-                resends=options.resends,
-                words=options.batch_words,
-            )
-        except ValueError as error:
-            raise RigError(
-                f"{self._link.address} is too slow for a BioTac: {error}.",
-                hint=f"Choose a faster clock, or fewer resends than {options.resends}.",
-            ) from error
+        self._batches = FrameBatches(
+            options.frame,
+            speed_hz=self._link.speed_hz,
+            select=options.select,
+            resends=options.resends,
+            words=options.batch_words,
+        )
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
         self._last: tuple[int, int] | None = None
@@ -226,30 +219,22 @@ class BioTacDriver(Driver):
             self._received_ns = self._clock()
 
     def _take(self, reply: SpiReply) -> None:
+        """Take the rows of a batch from its reply; the batches sent before it are lost."""
         self._received_ns = self._clock()
-        first = self._answered(reply)
-        if first is None:
+        numbers = [number for number, _ in self._sent]
+        if reply.number not in numbers:
             return
-        device_ns = None
-        if reply.device_us is not None:
-            device_ns = 1000 * self._begun_us(reply.device_us, first)
-        self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
-
-    def _answered(self, reply: SpiReply) -> int | None:
-        """Return the first position of the batch that `reply` belongs to (None: no batch); earlier batches are lost."""
-        if reply.number not in (number for number, _ in self._sent):
-            return None
-        while True:
-            number, first = self._sent.popleft()
-            if number == reply.number:
-                return first
+        for _ in range(numbers.index(reply.number)):
+            self._sent.popleft()
             self._counts["batches lost"] += 1
+        _, first = self._sent.popleft()
+        device_ns = None if reply.device_us is None else 1000 * self._begun_us(reply.device_us, first)
+        self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
 
     def _begun_us(self, counter_us: int, first: int) -> int:
         """Return a batch's start [us] by the adapter's counter without wraps; count frames not requested before it."""
-        if self._last is None:
-            begun_us = counter_us
-        else:
+        begun_us = counter_us
+        if self._last is not None:
             last_first, last_us = self._last
             begun_us = last_us + (counter_us - last_us) % 2**32
             word_us = 1e6 / COMMAND_RATE.to("Hz")
@@ -269,7 +254,8 @@ class BioTacDriver(Driver):
         self._running = False
         with contextlib.suppress(LinkError):
             while self._sent:
-                self._answered(self._link.receive(PATIENCE_S))
+                self._link.receive(PATIENCE_S)
+                self._sent.popleft()
         self._link.abandon()
 
     def close(self) -> None:

@@ -11,10 +11,17 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import Fault, SpiDeviceEmulator, fault_concerns, read_options
+from tactbench.plugin.devices import (
+    EmulatorSettings,
+    Fault,
+    Senses,
+    SpiDeviceEmulator,
+    fault_concerns,
+    read_options,
+)
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
     CLOCK,
@@ -29,10 +36,7 @@ from tactbench.sensors.biotac.codec import (
     encoded,
     parity_holds,
 )
-from tactbench.sensors.biotac.options import BioTacOptions
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import EmulatorSettings, Senses
+from tactbench.sensors.biotac.frames import BioTacOptions
 
 _ROUNDING_S = 1e-9
 """Tolerance for rounded times: float64 seconds are 0.1 ns apart after eleven days."""
@@ -84,14 +88,13 @@ class BioTacFault(Fault):
 @dataclass
 class _Answer:
     data: bytes
-    """Bytes that the host receives as the answer to a command."""
+    """Bytes that the host has still to receive as the answer to a command."""
     word: bytes = b""
     """Word that a resend command repeats; empty if no word was sent."""
     channel: str = ""
     early: int | None = None
     """Second byte of the error reply that is sent instead of the data if read before `ready_s`."""
     ready_s: float = -math.inf
-    sent: int = 0
 
 
 REST: Mapping[str, float] = {
@@ -175,9 +178,8 @@ class Emulator(SpiDeviceEmulator):
             answer = self._answer = self._error(answer.early)
         if answer.word:
             self._last = answer
-        out = answer.data[answer.sent : answer.sent + n]
-        answer.sent += n
-        if answer.word and answer.sent >= len(answer.data):
+        out, answer.data = answer.data[:n], answer.data[n:]
+        if answer.word and not answer.data:
             self._answer = None
         # What follows a property's last byte is assumed: the driver reads texts up to a 00 or FF.
         return out + _IDLE * (n - len(out))

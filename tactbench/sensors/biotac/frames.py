@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
+from pydantic import BeforeValidator, Field
 
-from tactbench.plugin import Block, Quality, Source, StreamSpec
-from tactbench.plugin.devices import SpiStep
+from tactbench.plugin import Block, Quality, RigError, Source, StreamSpec
+from tactbench.plugin.devices import Options, SpiStep
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, NAMES, STREAMS
 from tactbench.sensors.biotac.codec import (
+    CHANNELS,
     COMMAND_RATE,
     INDEX,
     RESEND,
@@ -27,9 +30,6 @@ from tactbench.sensors.biotac.codec import (
     decoded,
     sampling_command,
 )
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
 
 DEFAULT_FRAME: tuple[str, ...] = tuple(
     name for slow in (*NAMES, "PDC", "TAC", "TDC") for name in (slow, "PAC")
@@ -105,8 +105,8 @@ class FrameRows:
             self._places.append((*columns[name], seen[name]))
             seen[name] += 1
         self._expected: Counter[tuple[int, int]] = Counter((k, nth) for k, _, nth in self._places)
-        self._open: list[_Row | None] = [None] * len(self._streams)
-        self._done: list[list[_Row]] = [[] for _ in self._streams]
+        self._rows: list[list[_Row]] = [[] for _ in self._streams]
+        """Rows of each stream in their order, the last of which may be incomplete."""
 
     def put(
         self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None
@@ -119,55 +119,37 @@ class FrameRows:
         frame, place = divmod(position, len(self.frame))
         k, column, nth = self._places[place]
         sequence = frame * self._rows_per_frame[k] + nth
-        row = self._open[k]
-        if row is None or row.sequence != sequence:
-            self._close(k)
-            width = len(self._streams[k].channels)
-            row = _Row(
-                sequence,
-                t_ns,
-                device_ns,
-                np.zeros(width, dtype=self._streams[k].dtype),
-                np.full(width, Quality.MISSING, dtype=np.uint8),
-                self._expected[k, nth],
-            )
-            self._open[k] = row
+        rows = self._rows[k]
+        if not (rows and rows[-1].to_come and rows[-1].sequence == sequence):
+            data = np.zeros(len(self._streams[k].channels), dtype=self._streams[k].dtype)
+            missing = np.full(data.size, Quality.MISSING, dtype=np.uint8)
+            rows.append(_Row(sequence, t_ns, device_ns, data, missing, self._expected[k, nth]))
+        row = rows[-1]
         row.data[column], row.quality[column] = count, quality
         row.to_come -= 1
-        if row.to_come == 0:
-            self._close(k)
 
-    def _close(self, k: int) -> None:
-        row = self._open[k]
-        if row is not None:
-            self._done[k].append(row)
-            self._open[k] = None
-
-    def close(self) -> None:
-        """End all incomplete rows; words not received are marked MISSING."""
-        for k in range(len(self._streams)):
-            self._close(k)
-
-    def blocks(self) -> list[Block]:
+    def blocks(self, *, incomplete: bool = False) -> list[Block]:
         """Return the rows that ended since the last call, in one block for each stream with such rows.
 
-        A row of ``electrodes`` is one frame. Its times are those of the frame's first command but PAC; in the default
-        frame the others follow every 454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
+        With `incomplete`, the last rows end, too: words not received are marked MISSING. A row of ``electrodes`` is one
+        frame. Its times are those of the frame's first command but PAC; in the default frame the others follow every
+        454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
         """
         found = []
-        for stream, rows in zip(self._streams, self._done, strict=True):
-            if rows:
+        for stream, rows in zip(self._streams, self._rows, strict=True):
+            left = [row for row in rows[-1:] if row.to_come and not incomplete]
+            ended, rows[:] = rows[: len(rows) - len(left)], left
+            if ended:
                 found.append(
                     Block(
                         stream=stream.name,
-                        t_ns=_times([row.t_ns for row in rows]),
-                        data=np.stack([row.data for row in rows]),
-                        quality=np.stack([row.quality for row in rows]),
-                        sequence=np.array([row.sequence for row in rows], dtype=np.int64),
-                        device_ns=_times([row.device_ns for row in rows]),
+                        t_ns=_times([row.t_ns for row in ended]),
+                        data=np.stack([row.data for row in ended]),
+                        quality=np.stack([row.quality for row in ended]),
+                        sequence=np.array([row.sequence for row in ended], dtype=np.int64),
+                        device_ns=_times([row.device_ns for row in ended]),
                     )
                 )
-                rows.clear()
         return found
 
 
@@ -200,7 +182,7 @@ class FrameBatches(FrameRows):
 
     Raises
     ------
-    ValueError
+    RigError
         If `speed_hz` leaves no time for the words.
     """
 
@@ -225,9 +207,10 @@ class FrameBatches(FrameRows):
         self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
         self._within_us = self._commands * self._command_us + resends * self._word_us
         if self._paused_us(1) < self._within_us + self._word_us:
-            raise ValueError(
-                f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
-                f"fit into the time of a word, 1/{rate_hz} s"
+            raise RigError(
+                f"A clock of {speed_hz} Hz is too slow for a BioTac: {self._commands} x {self._command_us} us, the "
+                f"pauses between and {bits} bits do not fit into the time of a word, 1/{rate_hz} s.",
+                hint=f"Choose a faster clock, or fewer resends than {resends}.",
             )
         self.counts: Counter[str] = Counter()
 
@@ -299,3 +282,36 @@ class FrameBatches(FrameRows):
                     self.counts[f"resent {channel}"] += 1
                     return again
         return reply
+
+
+def _names(given: object) -> object:
+    """Return the channel names of a frame, given as text in a rig file."""
+    names = tuple(given.replace(",", " ").split()) if isinstance(given, str) else given
+    if isinstance(names, tuple) and (not names or set(names) - set(CHANNELS)):
+        raise ValueError(f"names of channels, separated by blanks, are expected: {', '.join(CHANNELS)}")
+    return names
+
+
+class BioTacOptions(Options):
+    """Options of the BioTac's driver and emulator."""
+
+    select: int = Field(default=1, ge=1, le=0xFF)
+    """Mask of the select lines that are active while this sensor is addressed; line i is bit i. On the maker's board
+    for several sensors 1, 2 and 4 select the first three [sourced: driver]."""
+    frame: Annotated[tuple[str, ...], BeforeValidator(_names)] = DEFAULT_FRAME
+    """Channels in the order of their commands, separated by blanks; 4400 commands a second whatever the frame."""
+    resends: int = Field(default=0, ge=0, le=3)
+    """Number of times that every word is requested again, so that words of wrong parity can be replaced."""
+    batch_words: int | None = Field(default=None, ge=1, le=1000)
+    """Words in a batch; None: one frame. Reduce for a bridge with a short buffer: a word is 14 bytes of payload."""
+    batches_ahead: int = Field(default=8, ge=2, le=16)
+    """Number of batches sent ahead, as far as the adapter can store them: the host may be late by their duration."""
+
+
+class LogOptions(Options):
+    """Options of the reader of the BioTac's text logs."""
+
+    sensor: int = Field(default=0, ge=0)
+    """Index, from 0, of the sensor: each has one pair of columns (value, parity) in the log."""
+    rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    """Sampling commands per second, needed if the log does not state this rate."""

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import Source
+import numpy as np
+
+from tactbench.plugin import FloatArray, Source
 from tactbench.plugin.simulation import SheetTable
 from tactbench.sensors.biotac.channels import ELECTRODES
 
@@ -51,14 +53,15 @@ def ray_length(angle_rad: float, outer_mm: float, dome_mm: float) -> float:
     return math.sqrt(outer_mm**2 - (ahead * math.cos(angle_rad)) ** 2) - ahead * math.sin(angle_rad)
 
 
-def core_reach_mm(from_mm: float, ray_rad: float, angle_rad: float) -> float:
-    """Return the extent [mm] of the core along a ray from the place `from_mm` (at most RAYS_FROM_MM) on the axis.
+def core_reach_mm(from_mm: FloatArray, ray_rad: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """Return the extents [mm] of the core along rays from places `from_mm` (at most RAYS_FROM_MM) on the axis.
 
-    `ray_rad` is the ray's angle from the perpendicular to the axis, `angle_rad` the angle around the finger.
+    `ray_rad` are the rays' angles from the perpendicular to the axis, `angle_rad` the angles around the finger; the
+    three broadcast.
     """
     # Where the ray meets the facet; away from it, where the facet bends back, the core's own radius.
-    leaning = max(_AXIAL * math.sin(ray_rad) + _DOWN * math.cos(ray_rad) * math.cos(angle_rad), 1e-9)
-    return min(CORE_MM, (_FACET_MM + _AXIAL * (RAYS_FROM_MM - from_mm)) / leaning)
+    leaning = np.maximum(_AXIAL * np.sin(ray_rad) + _DOWN * np.cos(ray_rad) * np.cos(angle_rad), 1e-9)
+    return np.minimum(CORE_MM, (_FACET_MM + _AXIAL * (RAYS_FROM_MM - from_mm)) / leaning)
 
 
 ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
@@ -111,13 +114,9 @@ def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
     for degrees in AT_RAY_DEG:
         ray = math.radians(degrees)
         reach.append((RAYS_FROM_MM, ray, ray_length(ray, outer_mm, dome_mm)))
-    rows = tuple(
-        tuple(
-            round(way - (core_reach_mm(begin, ray, math.radians(angle)) + thickness + skin_mm), 3)
-            for angle, thickness in zip(ANGLES_DEG, film, strict=True)
-        )
-        for (begin, ray, way), film in zip(reach, _FILM_MM, strict=True)
-    )
+    begin, ray, way = np.array(reach).T[:, :, None]
+    depth = way - (core_reach_mm(begin, ray, np.radians(ANGLES_DEG)) + np.array(_FILM_MM) + skin_mm)
+    rows = tuple(map(tuple, np.round(depth, 3).tolist()))
     return SheetTable(
         x_mm=_places(outer_mm, dome_mm),
         angle_deg=ANGLES_DEG,

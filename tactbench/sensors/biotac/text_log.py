@@ -22,8 +22,7 @@ import numpy as np
 from tactbench.plugin import DataError, Source
 from tactbench.plugin.devices import DeviceLog, read_options
 from tactbench.sensors.biotac.codec import CHANNELS, NAMES, Fault, Reply
-from tactbench.sensors.biotac.frames import FrameRows, quality_of, streams_of
-from tactbench.sensors.biotac.options import LogOptions
+from tactbench.sensors.biotac.frames import FrameRows, LogOptions, quality_of, streams_of
 
 _LONGEST_S = 9e9
 """Largest time [s] that is read, such that nanoseconds fit in 64 bits."""
@@ -45,7 +44,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     frame is that of most frames of the log. Error replies cannot be distinguished from wrong parity: the log has
     only the resulting number. Times are those of the log; without any they are row numbers over the rate, if the option
     `rate_hz` or the header states one. The rate of a log with times is measured from its first and last row. Options
-    are those of :class:`~tactbench.sensors.biotac.options.LogOptions`.
+    are those of :class:`~tactbench.sensors.biotac.frames.LogOptions`.
 
     Raises
     ------
@@ -86,9 +85,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             t_ns = round(line.time_s * 1e9) if timed else None
             rows.put(position, line.reply.value or 0, quality_of(line.reply), t_ns)
             samples.append((position, line.time_s))
-    rows.close()
     rate_hz, source = _rate(settings, header, samples)
-    streams, blocks = streams_of(order, rate_hz, source), rows.blocks()
+    streams, blocks = streams_of(order, rate_hz, source), rows.blocks(incomplete=True)
     if not timed and rate_hz is not None:
         period_ns = {stream.name: 1e9 / stream.rate_hz for stream in streams if stream.rate_hz is not None}
         blocks = [

@@ -204,26 +204,6 @@ def skin_frames(
     )
 
 
-def out_of_range(word: int) -> tuple[int, ...]:
-    """Return the numbers, 0 to 11, of the taxels that are out of range according to the error word."""
-    return tuple(taxel for taxel in range(TAXELS) if word >> 4 + taxel & 1)
-
-
-def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
-    """Return the byte a board sends, and True if the board flags it as out of range [sourced: IF theSkin, fill].
-
-    `change` is the converter's result minus baseline minus drift: pressure makes it positive and the byte smaller.
-    `no_load` is the byte at rest, `shift` the bits of the change that are dropped (arithmetically).
-    """
-    least, most = -((255 - no_load) << shift), no_load << shift
-    beyond = change <= 2 * least or change >= 2 * most
-    if change <= least:
-        return 255, beyond
-    if change >= most:
-        return 0, beyond
-    return no_load - (change >> shift), beyond
-
-
 @dataclass(frozen=True)
 class Sample:
     """Readings of one triangle's 12 taxels at one time; none is interpolated or copied from another sample."""
@@ -312,22 +292,18 @@ class SkinDecoder:
         if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
             triangle.counts["frames of wrong length"] += 1
             return []
-        head = triangle.head
-        if data[0] == HEAD:
-            if head is not None and self._near(head, frame) and head.data == data:
-                triangle.counts["frames doubled"] += 1
-                triangle.doubled += tuple(range(IN_HEAD))
-                return []
-            triangle.head = frame
+        is_head, head = data[0] == HEAD, triangle.head
+        last = head if is_head else triangle.tail if head is None else None
+        if not is_head:
+            triangle.tail = frame
+        if last is not None and self._near(last, frame) and last.data == data:
+            triangle.counts["frames doubled"] += 1
+            triangle.doubled += tuple(range(IN_HEAD) if is_head else range(IN_HEAD, TAXELS))
+            return []
+        triangle.head = frame if is_head else None
+        if is_head:
             return [] if head is None else [self._sample(key, triangle, head, None)]
-        last, triangle.head, triangle.tail = triangle.tail, None, frame
-        if head is None:
-            if last is not None and self._near(last, frame) and last.data == data:
-                triangle.counts["frames doubled"] += 1
-                triangle.doubled += tuple(range(IN_HEAD, TAXELS))
-                return []
-            return [self._sample(key, triangle, None, frame)]
-        if frame.t_ns - head.t_ns < 0.9 * self._period_ns:
+        if head is None or frame.t_ns - head.t_ns < 0.9 * self._period_ns:
             return [self._sample(key, triangle, head, frame)]
         return [self._sample(key, triangle, head, None), self._sample(key, triangle, None, frame)]
 
@@ -358,9 +334,10 @@ class SkinDecoder:
         marks = [Quality.SATURATED if value in (0, 255) else Quality.GOOD for value in taxels]
         for taxel in triangle.doubled:
             marks[taxel] |= Quality.SUSPECT
-        for taxel in out_of_range(word or 0):
-            marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
-            counts[f"T{taxel + 1} out of range"] += 1
+        for taxel in range(TAXELS):
+            if (word or 0) >> 4 + taxel & 1:
+                marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
+                counts[f"T{taxel + 1} out of range"] += 1
         far_apart = head is not None and tail is not None and not self._near(head, tail)
         if far_apart or tail is None or (word or 0) & (NO_ACK | RESERVED):
             marks = [mark | Quality.SUSPECT for mark in marks]

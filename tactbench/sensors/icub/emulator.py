@@ -27,7 +27,6 @@ from tactbench.plugin.devices import (
     fault_concerns,
     read_options,
 )
-from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
     BROADCAST,
@@ -43,19 +42,15 @@ from tactbench.sensors.icub.codec import (
     Version,
     VersionRequest,
     read_command,
-    reading,
     skin_frames,
     version_frame,
 )
 from tactbench.sensors.icub.options import FingertipOptions
+from tactbench.sensors.icub.spec import STREAMS
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
 """Version of the emulated board: an MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public
 application [sourced: IF, vAP and vCP of its main]."""
-_REST_RESULT, _NO_CHIP = 0x8000, 0xFFFF
-"""Results of the converter without contact [assumed: the middle of its range] and without a chip [sourced: IF
-AD7147.cpp]. A taxel that is not acknowledged reads 0."""
-
 _REST = {channel.name: channel.rest.to("count") for channel in STREAMS[0].channels if channel.rest is not None}
 _CHANNELS = tuple(_REST)
 
@@ -131,7 +126,6 @@ class Bus(DeviceEmulator):
     def _forget(self) -> None:
         """Reset the board's settings to the firmware's defaults."""
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
-        self._shift = 2
         self._enabled = set(range(16))
         self._reads_s = math.inf
 
@@ -172,10 +166,9 @@ class Bus(DeviceEmulator):
                 self._setup, self._enabled = setup, set()
                 if self._reads_s < math.inf:
                     self._start(now_s)
-            case TriangleSetup(first, last, shift, enabled) if first <= last < 16:
+            case TriangleSetup(first, last, _, enabled) if first <= last < 16:
                 triangles = set(range(first, last + 1))
                 self._enabled = self._enabled | triangles if enabled else self._enabled - triangles
-                self._shift = shift
                 self._reads_s = math.inf
             case Transmit(on=True):
                 self._start(now_s)
@@ -217,31 +210,30 @@ class Bus(DeviceEmulator):
         self._send(frames, now_s)
 
     def _fingertip(self, now_s: float) -> tuple[list[int], int]:
-        """Return the fingertip's taxel bytes and error word, from the converter's results less those at rest."""
-        no_load, shift = self._setup.no_load, self._shift
+        """Return the fingertip's taxel bytes and error word.
+
+        A taxel that is not acknowledged has the converter's result 0, without a chip all have FFFF [sourced: IF
+        AD7147.cpp]: far above and below the result at rest, in the middle of the range [assumed], and out of range.
+        """
         sensed = {**_REST, **self._senses(now_s)}
-        changes = [(no_load - min(max(round(sensed[name]), 0), 255)) << shift for name in _CHANNELS]
+        taxels = [min(max(round(sensed[name]), 0), 255) for name in _CHANNELS]
         word = 0
         for fault in (one for one in self.faults if one.active(now_s)):
             concerned = [_CHANNELS.index(name) for name in fault.channels]
             match fault.name:
                 case "stuck-taxel":
                     for taxel in concerned:
-                        changes[taxel] = self._stuck.setdefault((fault, taxel), changes[taxel])
+                        taxels[taxel] = self._stuck.setdefault((fault, taxel), taxels[taxel])
                 case "no-ack":
                     word |= NO_ACK
                     for taxel in concerned:
-                        changes[taxel] = -_REST_RESULT
+                        taxels[taxel] = 255
+                        word |= 1 << 4 + taxel
                 case "not-connected":
-                    word |= NOT_CONNECTED
-                    changes = [_NO_CHIP - _REST_RESULT] * TAXELS
+                    word |= NOT_CONNECTED | 0xFFF0
+                    taxels = [0] * TAXELS
                 case "error-word":
                     word |= fault.word
-        taxels = []
-        for taxel, change in enumerate(changes):
-            value, beyond = reading(change, no_load, shift)
-            taxels.append(value)
-            word |= beyond << 4 + taxel
         return taxels, word
 
     def _send(self, frames: Iterable[CanFrame], now_s: float) -> None:

@@ -10,20 +10,19 @@ import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
 from tactbench.plugin.devices import CanFrame, DeviceLog, read_can_log, read_options
-from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
     OLD_SKIN,
     SKIN,
     TAIL,
-    BoardSetup,
     SkinDecoder,
     TriangleSetup,
     read_command,
     to_block,
 )
 from tactbench.sensors.icub.options import LogOptions
+from tactbench.sensors.icub.spec import STREAMS
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
@@ -55,7 +54,13 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
             commands.append(found)
     board, triangle = _chosen(path, settings, sorted(halves), len(frames))
     half = halves[board, triangle]
-    period_s, rate = _period(path, settings, half)
+    steps = np.diff([frame.t_ns for frame in half if frame.data[0] == HEAD])
+    steps = steps[steps > 0]
+    if not len(steps):
+        raise DataError(f"{path} has too few samples to compute their period.", hint="Record for longer.")
+    period_s = 1e-9 * float(np.median(steps))
+    text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
+    rate = Source(tag="measured", reference=text)
     decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
     samples = [sample for frame in half for sample in decoder.feed(frame)] + decoder.flush()
     if not samples:
@@ -72,18 +77,11 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         "samples kept out, not after the one before": len(samples) - len(kept),
         "baselines taken": sum(isinstance(command, TriangleSetup) for command in sent),
     }
-    setups = dict.fromkeys(command for command in sent if isinstance(command, BoardSetup))
     return DeviceLog(
         streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
         blocks=(to_block(kept),),
         clock="host",
-        remarks=(
-            f"Board {board}, triangle {triangle}, {rate.reference}.",
-            *(
-                f"The log sets the board up for type {setup.skin_type}, {setup.period_ms} ms, {setup.no_load} at rest."
-                for setup in setups
-            ),
-        ),
+        remarks=(f"Board {board}, triangle {triangle}, {rate.reference}.",),
         counts={name: number for name, number in counts.items() if number},
     )
 
@@ -109,17 +107,3 @@ def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], fram
             hint=f"Choose one by the options board and triangle. The log has: {listed}.",
         )
     return fitting[0]
-
-
-def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
-    """Return the period between samples in seconds, and its source (option or log)."""
-    if settings.period_ms is not None:
-        text = f"{settings.period_ms} ms between samples by the option period_ms"
-        return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
-    steps = np.diff([frame.t_ns for frame in frames if frame.data[0] == HEAD])
-    steps = steps[steps > 0]
-    if not len(steps):
-        raise UsageError(f"{path} has too few samples to compute their period.", hint="State the option period_ms.")
-    period_s = 1e-9 * float(np.median(steps))
-    text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
-    return period_s, Source(tag="measured", reference=text)

@@ -64,13 +64,11 @@ class FingertipOptions(Options):
 
 
 class LogOptions(Options):
-    """Options of the log reader: the fingertip's board and triangle, and facts that the log does not state."""
+    """Options of the log reader: the fingertip's board and triangle, and whether early firmware was in use."""
 
     board: int | None = Field(default=None, ge=0, le=14)
     """Number of the board; None: the only board in the log."""
     triangle: int | None = Field(default=None, ge=0, le=15)
     """Number of the fingertip's triangle on the board; None: the only triangle in the log."""
-    period_ms: int | None = Field(default=None, ge=1, le=255)
-    """Milliseconds between samples; None: the median interval between the log's samples."""
     old_ids: bool = False
     """Accept frames of class 3, too, which early firmware sends, but other analog sensors as well."""

@@ -72,7 +72,7 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> T
 
     def read(state: SkinState) -> FloatArray:
         closeness = foam_mm / np.maximum(state.thickness_mm, least_mm)
-        return np.asarray(rest - gain * (weights @ closeness.ravel() - 1.0))
+        return rest - gain * (weights @ closeness.ravel() - 1.0)
 
     return read
 

@@ -16,7 +16,7 @@ def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -
     half = float(centres_mm[1] - centres_mm[0]) / 2
     edges = np.append(centres_mm - half, centres_mm[-1] + half) - at_mm
     primitive = np.array([math.erf(edge / (math.sqrt(2.0) * sigma_mm)) for edge in edges])
-    return np.asarray(sigma_mm * math.sqrt(math.pi / 2) * np.diff(primitive))
+    return sigma_mm * math.sqrt(math.pi / 2) * np.diff(primitive)
 
 
 def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:

@@ -18,7 +18,6 @@ from tests.core.pool.patience import ending
 ROOT = Path(__file__).parents[3]
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
-SECOND_SCREEN, FIRST_SCREEN = "\x1b[?1049h", "\x1b[?1049l"
 
 
 class Terminal:
@@ -43,11 +42,6 @@ class Terminal:
                 break
             self.seen += piece.decode(errors="replace")
         return self.seen[since:]
-
-    def last_words(self):
-        """Return what stands on the first screen after the second one was left."""
-        self.read_until(None, 30)
-        return plain(self.seen.rpartition(FIRST_SCREEN)[2])
 
 
 def computed(done):

@@ -108,20 +108,3 @@ def test_an_import_replaces_no_other_declaration_unasked(pad):
     assert declared.read_bytes() == before
     pad(*imports, "--replace")
     assert yaml.safe_load(declared.read_text())["tasks"][0]["splits"] == ["recording"]
-
-
-LINE = 1 + PAD.splitlines().index("tasks:")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
-    ],
-)
-def test_what_a_mapping_declares_wrongly_is_refused_with_its_line(pad, old, new, says):
-    assert old in PAD
-    (pad.folder / "pad.yaml").write_text(PAD.replace(old, new))
-    refused = pad("import", "pad.yaml", "--out", "rec", code=2)
-    assert says in " ".join(refused.stderr.split())
-    assert not (pad.folder / "rec").exists()

@@ -54,6 +54,11 @@ def test_import_then_inspect(tables):
     assert [one["meta"]["name"] for one in about] == ["one", "two"]
     assert {finding["check"] for finding in about[0]["findings"]} == {"stuck", "missing"}
     assert about[0]["content_sha256"] != about[1]["content_sha256"]
+    (taxels, scale) = about[0]["streams"]
+    assert (taxels["of"], taxels["rows"], taxels["channels"]) == (
+        "sensor", 50, [{"kind": "taxel", "unit": "count", "names": ["a", "b"]}],
+    )  # fmt: skip
+    assert (scale["seconds"], scale["mean_rate_hz"]) == pytest.approx((0.49, 100.0))
     assert "(verified)" in tables("inspect", "recordings/one.h5").stdout
 
 
@@ -61,7 +66,7 @@ def test_an_error_in_the_data_is_an_exit_code(tables):
     with (tables.folder / "two.csv").open("a") as two:
         two.write("0.1,1,1,2\n")
     assert "backwards" in tables("import", "mapping.yaml", "--out", "recordings", code=1).stdout
-    assert (tables.folder / "recordings" / "two.h5").exists()
+    assert "backwards" in tables("inspect", "recordings/two.h5", "recordings/one.h5", code=1).stdout
 
 
 def test_without_what_only_posix_has(tables):
@@ -95,13 +100,13 @@ def test_record_then_inspect(verbs):
 def test_what_a_crash_left_behind(tables):
     tables("import", "mapping.yaml", "--out", "recordings")
     one = tables.folder / "recordings" / "one.h5"
-    assert "--salvage" in tables("inspect", str(one), "--salvage", code=2).stderr
     with RecordingWriter(tables.folder / "new.h5", read_meta(one)) as writer:
         writer.append(Block("taxels", np.arange(9), np.ones((9, 2))))
         writer.append(Block("scale", np.arange(9), np.ones((9, 1))))
         shutil.copy(tables.folder / "new.h5.partial", tables.folder / "left.h5.partial")
+    assert "--rescue" in tables("inspect", "left.h5.partial", code=2).stderr
     assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--salvage").stdout)
-    tables("inspect", "left.h5.partial", "--rescue", "left.h5")
+    assert re.search(r"sensor\s+9\s", tables("inspect", "left.h5.partial", "--rescue", "left.h5").stdout)
     assert read_meta(tables.folder / "left.h5").excluded
 
 

@@ -85,4 +85,4 @@ def test_events_in_time_go_from_the_row_to_tables_why_and_cost(verbs):
         assert "pac-band" in verbs("cost", "--sensor", "made", *asked).stdout
     costs = json.loads((verbs.folder / "tactbench-results" / "cost" / "made-slip.json").read_text())["settings"]
     (parts,) = [one["delay_parts_ms"] for one in costs if (one["knob"], one["value"]) == ("estimator", "pac-band")]
-    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+    assert (parts["window"], parts["sampling"]) == pytest.approx((50.0, 10.0))

@@ -60,7 +60,14 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
 
 @pytest.mark.parametrize("words", ["list", "datasets", "show force biotac", "choose --task force"])
 def test_a_list_for_programs_is_one_json_document(verbs, words):
-    assert json.loads(verbs(*words.split(), "--format", "json").stdout)
+    found = json.loads(verbs(*words.split(), "--format", "json").stdout)
+    assert found
+    if words == "list":
+        assert found["sensors"]["icub"] == "iCub fingertip"
+    if words == "datasets":
+        assert {one["name"]: one["MB"] for one in found}["biotac-slide"] == 115.3
+    if words.startswith("show"):
+        assert [one["spec"]["name"] for one in found] == ["force", "biotac"]
 
 
 def test_help_imports_no_verb_and_listing_loads_no_numerics():

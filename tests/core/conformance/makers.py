@@ -168,7 +168,6 @@ SILENT = {
 }
 """Which of them, counted from 1, `check` does not find, and why."""
 FOUND_BY = {
-    10: "driver-follows-a-step",
     18: "response-is-where-it-is-pressed",
     22: "it-answers-to-a-press",
     24: "skin-yields-as-skins-do",

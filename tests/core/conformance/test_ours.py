@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import pytest
 
 from tactbench.core.conformance.check import KINDS
@@ -23,8 +21,6 @@ SIMULATED = {"biotac", "icub", "ideal", "twin"}
 
 @pytest.mark.parametrize(("kind", "name"), OURS, ids=[f"{kind}-{name}" for kind, name in OURS])
 def test_it_passes(kind, name):
-    if "forest-fast" in name and importlib.util.find_spec("sklearnex") is None:
-        pytest.skip("needs the extra fast")
     (subject,) = subjects_named(installed(), name, (kind,))
     report = run_checks(subject, isolated=False)
     assert report.ok, str(report)

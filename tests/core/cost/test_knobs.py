@@ -1,25 +1,17 @@
 """What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import Setting, measure, quick_estimator, settings_of
+from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
 from tactbench.core.cost.precision import precise
-from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import stated_delay_ms
-from tactbench.core.evaluation.folds import load_task
-from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.figures.trade import draw_precision, draw_trade
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS
@@ -94,60 +86,46 @@ def test_what_was_finished_is_found_again(shelf, tmp_path):
     assert times == {one["value"]: one["fit_s"] for one in few["settings"]}, "nothing is timed twice"
 
 
-def test_the_figure_has_a_path_for_each_knob_and_one_mark_for_each_family(known):
+def test_the_figure_has_a_path_for_each_knob_and_a_panel_for_each_sensor(known):
     with styled():
         drawn = draw_trade(known)
-        points = [cost_point(t, 1 / t, subject=name, family=one) for name in "ab" for t, one in ((1, name), (2, "x"))]
-        panels = draw_precision(points, "Two sensors").axes
+        panels = draw_precision([cost_point(t, 1 / t, subject=name) for name in "ab" for t in (1, 2)], "Two").axes
     paths = {line.get_label(): line for axes in drawn.axes for line in axes.get_lines()}
     for knob in ("trees", "window k", "every n-th sample"):
         own = [one for one in known["settings"] if one["knob"] == knob]
         assert list(paths[knob].get_xdata()) == [one["answer_delay_ms"] for one in own]
         assert list(paths[knob].get_ydata()) == [one["score"] for one in own]
-    marks = [[line.get_marker() for line in axes.get_lines() if line.get_label() == "x"] for axes in panels]
-    assert marks[0] == marks[1]
+    for axes in panels:
+        points, noise = axes.get_lines()
+        assert (list(points.get_xdata()), list(points.get_ydata())) == ([1, 2], [1, 0.5])
+        assert noise.get_ydata()[0] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("name", ["deployable@every=3,k=4", "deployable@every=3", "deployable@k=4"])
-def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, name):
-    task, rules = registry.tasks["force"].spec, protocol_called(name)
-    paths = sorted(shelf.glob("*.h5"))
-    plain, made = (load_task(task, paths, one, "session") for one in ("deployable", name))
-    assert np.array_equal(made.X, np.concatenate([table.X[:: rules.every] for table in plain.data.tables]))
-    k = 0 if rules.k is None else rules.k
-    fold = prepared(made.assignments[0], made.data, made.rules, k, Counter())
-    rows = made.X[made.folds[0][1]]
-    train = made.X[made.folds[0][0]]
-    scaled = (rows - train.mean(axis=0)) / train.std(axis=0)
-    assert fold.test.X[-1] == pytest.approx(scaled[len(scaled) - k - 1 :].mean(axis=0))
-    parts, _ = stated_delay_ms(made, registry.estimators["ols"], k)
-    assert parts["sampling"] == pytest.approx(10.0 * rules.every)
-    assert parts["window"] == pytest.approx(10.0 * rules.every * k / 2)
-
-
-def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
-    task = registry.tasks["slip-sequence"].spec
-    knobs = {one.knob for one in settings_of(task, [registry.estimators["forest"]], "deployable")}
-    assert "window k" not in knobs
-    with pytest.raises(NotApplicable, match="single samples"):
-        load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+def test_settings_are_the_defaults_and_values_on_either_side(registry):
+    force, forest = registry.tasks["force"].spec, registry.estimators["forest"]
+    values = {}
+    for one in [
+        *settings_of(force, [forest], "deployable"),
+        *simulations_of(registry.rigs["twin"], forest, "karl2016"),
+    ]:
+        values.setdefault(one.knob, []).append(one.value)
+    of_recordings = settings_of(registry.tasks["slip-sequence"].spec, [forest], "deployable")
+    assert "window k" not in {one.knob for one in of_recordings}
+    assert values == {
+        "trees": ["3", "10", "30", "100", "300", "500"], "window k": ["0", "2", "5", "10", "20", "40"],
+        "every n-th sample": ["1", "2", "5", "10", "20"], "training sessions": ["1", "2", "5", "10"],
+        "estimator": ["forest"], "rung": list(registry.rigs["twin"].rungs[:-1]), "tolerance": ["3", "1", "0.3"],
+    }  # fmt: skip
 
 
 def test_the_quick_estimator_is_linear_and_searches_nothing(registry):
     assert quick_estimator(registry, "force") == "ols"
 
 
-def test_a_setting_is_of_its_own_row_only():
-    row = {"cell": "s/force/replay/deployable:few-shot-1/ols/1", "estimator": "ols", "params": {}}
-    ols = EstimatorChoice(name="ols")
-    assert Setting("k", "1", "deployable", ols, "few-shot-1").is_of(row)
-    assert not Setting("k", "1", "deployable", ols).is_of(row)
-
-
-def cost_point(seconds, error, *, default=False, floor=0.3, subject="pad", family="newton"):
+def cost_point(seconds, error, *, subject="pad"):
     return CostPoint(
         subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=floor, default=default, rung="", settings={"family": family},
+        floor=0.3,
     )  # fmt: skip
 
 

@@ -4,11 +4,8 @@ import csv
 import io
 import json
 import re
-import sys
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
@@ -18,23 +15,15 @@ from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.latex import tex
 
-from .rows import row
-from .strategies import some_rows
-
-many = settings(max_examples=30)
-views = st.sampled_from((DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))))
+from .rows import hostile_rows, row
 
 
-def written(shape, rows, *provenance):
-    return rendered(build_table(rows, provenance), shape)
+def written(shape, rows):
+    return rendered(build_table(rows), shape)
 
 
-@many
-@given(some_rows())
-def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows):
-    import openpyxl
-    import pyarrow.parquet as pq
-
+def test_json_and_csv_hold_the_cells_of_the_table():
+    rows = hostile_rows()
     table = build_table(rows)
     names = [SHOWN[name] for name in COLUMNS]
     lines = [tuple(line.texts.values()) for block in table.blocks for line in block.lines]
@@ -44,21 +33,11 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows):
     ]
     of_csv = list(csv.DictReader(io.StringIO(written("csv", rows).decode(), newline="")))
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
-    read = pq.read_table(io.BytesIO(written("parquet", rows, {"host": "one"})))
-    assert list(zip(*(read[f"shown_{name}"].to_pylist() for name in names), strict=True)) == lines
-    assert read["score"].to_pylist() == [one["score"] for one in table.rows]
-    assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == [{"host": "one"}]
-    sheet = openpyxl.load_workbook(io.BytesIO(written("xlsx", rows)))["leaderboard"]
-    heads, *values = sheet.iter_rows()
-    place = [cell.value for cell in heads].index("shown_sensor")
-    assert [line[place].value or "" for line in values] == [one[names.index("sensor")] for one in lines]
-    assert "f" not in {cell.data_type for line in values for cell in line}, "no formula"
 
 
-@many
-@given(some_rows(), views)
-def test_markdown_shows_the_cells_of_the_table_as_text(rows, view):
-    table = build_table(rows)
+@pytest.mark.parametrize("view", [DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))])
+def test_markdown_shows_the_cells_of_the_table_as_text(view):
+    table = build_table(hostile_rows())
     cells, place = [], None
     for token in (
         MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(rendered(table, "md", view).decode())
@@ -83,13 +62,6 @@ def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number(
         r"\\label\{(tab:tactbench-[a-z0-9-]+)\}", written("latex", [row(), row(split="trial")]).decode()
     )
     assert labels == ["tab:tactbench-question-1", "tab:tactbench-question-2"]
-
-
-@pytest.mark.parametrize(("library", "shape"), [("pyarrow", "parquet"), ("openpyxl", "xlsx")])
-def test_without_its_library_a_format_says_what_to_install(monkeypatch, library, shape):
-    monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(UsageError, match=rf"tactbench\[{shape}\]"):
-        written(shape, [row()])
 
 
 def test_tables_that_cannot_be_written_are_refused_with_the_folder(tmp_path):

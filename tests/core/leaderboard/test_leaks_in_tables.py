@@ -59,7 +59,7 @@ def test_what_the_first_frame_gives_away_is_said_in_every_format(tmp_path):
         X = n % 4 + 0.1 * rng.standard_normal((12, 3))
         record(tmp_path / "in" / f"{n}.h5", X, session="s", trial=str(n // 4), labels={"object": f"thing {n % 4}"})
     tactbench.run(task="object-identity", recordings=tmp_path / "in", estimator="logistic", split="trial", probe=True)
-    says = "logistic: first frame alone 1.000 of 1.000."
+    says = "logistic: leaks: first frame alone 1.000 of 1.000"
     printed = {shape: Verbs(tmp_path, here=True)("leaderboard", "--protocol", "deployable", "--format", shape).stdout
                for shape in ("table", "md", "latex", "json")}  # fmt: skip
     for shape, mark in (("table", "‡"), ("md", "‡"), ("latex", r"$\ddagger$")):

@@ -3,8 +3,7 @@
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, record_of, tables_of, with_declared
-from tactbench.core.spec.matrix import ComparisonChoice
+from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, record_of, tables_of
 
 from .rows import row
 
@@ -52,15 +51,12 @@ def test_what_must_not_be_compared_is_refused_with_its_reason(more):
     assert all(record_of(one)["difference"] is None for one in found)
 
 
-def test_declared_comparisons_are_corrected_for_all_that_were_declared():
-    rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols")]
-    declared = [ComparisonChoice(sensors=("a", "b")), ComparisonChoice(estimators=("lasso", "ols")),
-                ComparisonChoice(sensors=("a", "nobody"))]  # fmt: skip
-    found = with_declared(comparisons(rows, "b", "a"), rows, declared)
-    p = found[0].difference.p
-    assert p == 2 / 64
-    # Four were tested: two pairs of sensors at p, two pairs of estimators with none to tell.
-    assert [one.p_corrected for one in found] == [4 * p, 4 * p]
+def test_p_values_are_corrected_for_all_pairs_compared_at_once():
+    rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols"),
+            answered(estimator="ridge")]  # fmt: skip
+    found = comparisons(rows, "b", "a")
+    assert [one.difference and one.difference.p for one in found] == [2 / 64, 2 / 64, None]
+    assert [record_of(one)["p_holm"] for one in found] == [2 * 2 / 64, 2 * 2 / 64, None]
 
 
 def test_two_folders_are_compared_cell_by_cell():

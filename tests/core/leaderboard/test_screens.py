@@ -19,7 +19,7 @@ from .rows import row
 
 HERE = Path(__file__).parent / "screens"
 DOCUMENT = r"""\documentclass[twocolumn]{article}
-\usepackage{booktabs}
+\usepackage{booktabs,graphicx}
 \begin{document}
 %s
 \end{document}

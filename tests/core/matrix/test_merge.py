@@ -91,6 +91,16 @@ def test_two_finished_cells_of_one_name_agree_or_are_refused(tmp_path, one, othe
     assert differs in said
 
 
+def test_many_contradictions_are_counted(tmp_path):
+    for name, score in (("one", 1.0), ("two", 2.0)):
+        with Store(tmp_path / name).hold() as store:
+            for place in range(11):
+                kept(store, f"c{place:02}", score=score)
+    said = refused(tmp_path, tmp_path / "one", tmp_path / "two")
+    assert said.count("score 1.0 -> 2.0; ") == 10
+    assert "; and 1 more" in said
+
+
 def test_recordings_come_along_and_damaged_cells_are_told(tmp_path):
     folder = tmp_path / "one"
     path = record(folder / "recordings" / "made" / "scene.h5")

@@ -107,7 +107,13 @@ def test_runs_of_other_seeds_merged_are_one_run(ran, shelf, tmp_path):
     assert json.loads(rendered(table_of(store, shown_rows(store)), "json"))[0]["seeds"] == [1, 2, 3]
 
 
-def test_choices_that_do_not_go_together_are_refused(tmp_path):
+def test_choices_that_do_not_go_together_are_refused(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match="--jobs 2"):
         run_matrix(matrix(), Store(tmp_path / "out"), choice=EngineChoice("in-process", jobs=2))
     assert not (tmp_path / "out").exists()
+    EngineChoice("in-process", jobs=1).check()
+    EngineChoice("isolated", jobs=2).check()
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    EngineChoice("isolated", jobs=2).check()
+    with pytest.raises(UsageError, match="distributed"):
+        EngineChoice("dask").check()

@@ -41,6 +41,10 @@ def raises():
     raise ValueError("no such luck")
 
 
+def runs_out():
+    raise MemoryError
+
+
 def refuses():
     raise NotApplicable("not this one", hint="Try another.")
 

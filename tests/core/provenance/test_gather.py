@@ -10,10 +10,8 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-import psutil
-
 from tactbench.core.plugins.registry import installed, load_registry
-from tactbench.core.provenance.gather import _commit, gather, host_id, usable_cores
+from tactbench.core.provenance.gather import _commit, cpu_model, gather, host_id, usable_cores
 from tactbench.core.provenance.source import source_digest
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_acme
@@ -51,9 +49,25 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
     assert getpass.getuser() not in found.values()
     assert found["distributions"]["numpy"] == metadata.version("numpy")
     assert (found["seed"], found["host"], len(host_id())) == (1, host_id(), 12)
-    assert usable_cores() == len(os.sched_getaffinity(0))
-    assert found["memory_mb"] == psutil.virtual_memory().total >> 20
     assert found["threads"] == os.environ["OMP_NUM_THREADS"]
+
+
+def test_machines_differ_by_processor_and_cores(monkeypatch):
+    assert f"model name\t: {cpu_model()}\n" in Path("/proc/cpuinfo").read_text()
+    assert usable_cores() == len(os.sched_getaffinity(0))
+    host, _ = host_id(), [one.cache_clear() for one in (host_id, cpu_model)]
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for cores, usable in ((None, 1), (3, 3)):
+        monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)
+        assert usable_cores() == usable
+    assert host_id() != host
+    for name, shown in (("", "unknown"), ("x86", "x86")):
+        monkeypatch.setattr(platform, "processor", lambda name=name: name)
+        monkeypatch.setattr(Path, "read_text", lambda _: "no model")
+        cpu_model.cache_clear()
+        assert cpu_model() == shown
+    monkeypatch.undo()
+    _ = [one.cache_clear() for one in (host_id, cpu_model)]
 
 
 def test_a_strangers_plugin_is_told_with_its_source(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ Never write such a file anew: if this test fails, the reader has lost the abilit
 import numpy as np
 import pytest
 
-from tactbench.core.recording.clock_fit import HostTimes
+from tactbench.core.recording.clock_fit import host_times
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
 from tests.conftest import ROOT
@@ -35,7 +35,7 @@ def test_versions_from_2_on(version, digest):
     clock = meta.clocks["taxels"]
     assert (clock.delay_ns, clock.wraps, clock.breaks) == ((200_000, 300_000), 1, 1)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
-    assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
+    assert np.array_equal(taxels.t_ns, host_times(clock.segments, taxels.device_ns))
     assert np.argwhere(taxels.quality == Quality.GAP).tolist() == [[40, 0], [40, 1], [40, 2]]
     assert taxels.annotations["object"].tolist() == ["ball"] * 100 + ["Bär"] * 80
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.recording.lag import find_lag
+from tactbench.core.recording.lag import find_lag, windows
 
 STEP_S = 0.001
 
@@ -94,3 +94,32 @@ def test_what_cannot_tell_is_no_lag(force):
 def test_creep_does_not_hide_a_lag():
     found = find_lag(*clocked(lambda f: f + low_pass(f, 1.5), lag=0.25))
     assert found.middle[0] == pytest.approx(0.25, abs=0.03)
+
+
+def test_a_recording_is_searched_whole_or_at_both_ends_if_it_is_long():
+    tenths = np.arange(2002) * 10**8 + 5 * 10**9
+    assert windows(tenths, tenths[1:]) == {"": (5_100_000_000, 205_100_000_000)}
+    first, last = 5_000_000_000, 205_100_000_000
+    ends = {" at the beginning": (first, first + 10**11), " at the end": (last - 10**11, last)}
+    assert windows(tenths, tenths) == ends
+    fast = np.arange(6002) * 10**7
+    assert windows(fast[:-1], fast) == {"": (0, 60 * 10**9)}
+    assert windows(fast, fast) == {
+        " at the beginning": (0, 30 * 10**9),
+        " at the end": (30_010_000_000, 60_010_000_000),
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "beginning", "middle", "end"),
+    [
+        ({"lag": 0.25}, (0.249358, 0.002702), (0.249049, 0.001973), (0.248740, 0.003049)),
+        ({"lag": 0.3, "drift": 0.02}, (0.306527, 0.002646), (0.509279, 0.001780), (0.712030, 0.002149)),
+        ({"lag": 0.02, "drift": -0.02, "rate_hz": 50, "force_hz": 30},
+         (0.019203, 0.005030), (-0.175648, 0.004896), (-0.370500, 0.005057)),
+    ],
+)  # fmt: skip
+def test_lags_and_uncertainties_are_those_that_were_looked_at(given, beginning, middle, end):
+    found = find_lag(*clocked(**given))
+    for one, expected in ((found.beginning, beginning), (found.middle, middle), (found.end, end)):
+        assert one == pytest.approx(expected, rel=1e-3)

@@ -12,7 +12,7 @@ from tactbench.core.errors import MissingRecordingError, RecordingError
 from tactbench.core.files import try_lock
 from tactbench.core.recording import image
 from tactbench.core.recording.mapping import import_tables
-from tactbench.core.recording.partial import rescue, salvage
+from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
@@ -106,7 +106,8 @@ def test_an_interrupt_at_any_write_leaves_the_right_file_or_none(scene, write):
                 assert np.array_equal(recording.read("taxels").data, DATA)
         elif write is record:
             for journal in scene.glob("*.partial"):
-                with salvage(journal) as recording:
+                rescue(journal, scene / "left.h5")
+                with open_recording(scene / "left.h5") as recording:
                     data = recording.read("taxels").data if recording.stream_names else DATA[:0]
                     assert np.array_equal(data, DATA[: len(data)])
 
@@ -127,6 +128,7 @@ def test_rows_that_are_not_written_are_found_when_they_are_read_back(scene, monk
         written(group, *given)
         if column in group:
             group[column][-5:] = "" if name == "_annotate" else 0
+        return group.get(given[0])
 
     monkeypatch.setattr(image, name, drop)
     with pytest.raises(RecordingError, match="read back"):

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
-from tactbench.core.recording.partial import salvage
+from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -28,7 +28,7 @@ def good(write):
     return write(DATA, force=np.arange(3000.0), notes={"object": np.repeat("ball", 3000)})
 
 
-@pytest.mark.parametrize("read", [open_recording, salvage])
+@pytest.mark.parametrize("read", [open_recording, lambda path: rescue(path, path.with_name("y.h5"))])
 def test_a_file_that_is_not_there_or_no_recording(tmp_path, read):
     for path in (tmp_path / "nowhere.h5", tmp_path):
         with pytest.raises(MissingRecordingError, match=path.name):
@@ -81,7 +81,9 @@ def test_a_file_that_contradicts_itself(good, tamper, says):
 @given(st.floats(0, 1, exclude_max=True), st.integers(0, 255))
 def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share, flip):
     journal, ends = tmp_path / "x.h5.partial", []
-    with RecordingWriter(tmp_path / "x.h5", about(), replace=True) as writer:
+    for name in ("x.h5", "copy.h5"):
+        (tmp_path / name).unlink(missing_ok=True)
+    with RecordingWriter(tmp_path / "x.h5", about()) as writer:
         writer.revise(labels={"object": "ball"})
         for number in range(5):
             n = np.arange(10) + 10 * number
@@ -94,7 +96,8 @@ def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share
     (tmp_path / "copy.partial").write_bytes(whole[:place] + rest)
     n = np.arange(10 * sum(end <= place for end in ends))
     try:
-        with salvage(tmp_path / "copy.partial") as recording:
+        rescue(tmp_path / "copy.partial", tmp_path / "copy.h5")
+        with open_recording(tmp_path / "copy.h5") as recording:
             meta, taxels = recording.meta, recording.read("taxels")
     except RecordingError:
         assert not len(n)

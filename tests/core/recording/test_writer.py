@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import RecordingError, RigError, UnwritableError
-from tactbench.core.recording.partial import REMARK, rescue, salvage
+from tactbench.core.recording.partial import REMARK, rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -23,9 +23,9 @@ def block(first=0, rows=ROWS, **change):
     return Block(**{"stream": "taxels", "t_ns": n * 1000, "data": n[:, None] * 7 + np.arange(3) * 13, **change})
 
 
-def record(path, meta, *steps, **options):
+def record(path, meta, *steps):
     """Write a recording step by step."""
-    with RecordingWriter(path, meta, **options) as writer:
+    with RecordingWriter(path, meta) as writer:
         for step in steps:
             step(writer)
 
@@ -53,16 +53,13 @@ def losing_rows(writer):
 
 
 @pytest.mark.parametrize(("fail", "simulated"), [(failing, False), (interrupted, False), (failing, True)])
-def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(tmp_path, fail, simulated):
+def test_an_exception_leaves_no_file_but_the_journal_of_a_real_device(tmp_path, fail, simulated):
     path, journal = tmp_path / "press.h5", tmp_path / "press.h5.partial"
     kept = not simulated
-    record(path, about(), appending())
-    before = path.read_bytes()
     steps = (appending(0, 3), revising(session="late", remarks=("late",)), fail)
     with pytest.raises((RigError, KeyboardInterrupt)) as caught:
-        record(path, about(simulated=simulated), *steps, replace=True)
-    assert path.read_bytes() == before
-    assert sorted(tmp_path.iterdir()) == ([path, journal] if kept else [path])
+        record(path, about(simulated=simulated), *steps)
+    assert [*tmp_path.iterdir()] == [journal] * kept
     if kept:
         assert "--rescue" in " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
         rescue(journal, tmp_path / "rescued.h5")
@@ -82,7 +79,8 @@ def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unaske
         record(path, about(), appending(0, 5), lambda _: record(path, about(), appending()))
     assert [one.name for one in sorted(tmp_path.iterdir())] == ["x.h5", "x.h5.2.partial", "x.h5.partial"]
     assert (tmp_path / "x.h5.partial").read_bytes() == kept
-    with open_recording(path) as recording, salvage(tmp_path / "x.h5.2.partial") as late:
+    rescue(tmp_path / "x.h5.2.partial", tmp_path / "late.h5")
+    with open_recording(path) as recording, open_recording(tmp_path / "late.h5") as late:
         assert (len(recording.stream("taxels")), len(late.stream("taxels"))) == (ROWS, 5)
     with pytest.raises(UnwritableError, match="exists already"):
         rescue(tmp_path / "x.h5.2.partial", path)
@@ -134,7 +132,8 @@ def test_a_disk_that_is_full(tmp_path, blocks, kept):
     assert "free space" in str(caught.value)
     assert "x.h5.partial --rescue" in " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
     assert [one.name for one in tmp_path.iterdir()] == ["x.h5.partial"]
-    with salvage(tmp_path / "x.h5.partial") as recording:
+    rescue(tmp_path / "x.h5.partial", tmp_path / "y.h5")
+    with open_recording(tmp_path / "y.h5") as recording:
         assert np.array_equal(recording.read("force_torque").data, np.concatenate(data[:kept]))
 
 

@@ -10,13 +10,13 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report import results as sections
 from tactbench.core.report.cells import recording_scores
 from tactbench.core.report.page import answers_section, make_page
-from tactbench.core.report.results import Results, SavedFigure, open_results
+from tactbench.core.report.results import Results, open_results
 
 from .html import Reader
 from .results import draw_one
 
 STRUCTURE = """\
-What came out [1 figure]
+What came out
 Leaderboard [1 filter]
   Curvature: which of five spherical caps touches the sensor?: sensor estimator macro F1 delay after touch training
   Force: how large is the normal force?: sensor estimator true RMSE [N] RMSE [N] published delay after touch training
@@ -38,8 +38,7 @@ def material(results):
 
 @pytest.fixture
 def subject(material, tmp_path):
-    other = draw_one(material, tmp_path)
-    return replace(material, drawn=(other, SavedFigure("published-and-ours", "Both", "Marks.", other.png)))
+    return replace(material, drawn=(draw_one(material, tmp_path),))
 
 
 def with_rows(material, *rows):

@@ -52,6 +52,12 @@ def test_a_value_that_cannot_be_is_refused_by_name(changed, values, says):
         changed.with_nuisances(values)
 
 
+def test_zero_is_an_amount():
+    name = "taxel_white_count"
+    assert SENSORS[0].with_nuisances({name: 0.0}).settable()[name].value == 0
+    assert SCENE.with_nuisances({"placement_scatter_mm": 0.0}).placement.scatter.value == 0
+
+
 def test_a_simulation_is_asked_with_nuisances_in_any_order():
     one = Simulation(nuisances={"noise_scale": 2, "drift_scale": 0.5})
     other = Simulation(nuisances={"drift_scale": 0.5, "noise_scale": 2.0})

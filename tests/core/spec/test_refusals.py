@@ -6,7 +6,6 @@ from pydantic import ValidationError
 from tactbench.core.errors import UsageError
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import THRESHOLDS, SlipTarget, SlipThresholds
-from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig import Parameter
 from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, RigFile
@@ -84,8 +83,6 @@ TAKEN_AND_REFUSED = [
      [{}, {"start": 0.5}, {"measure": "band-energy", "band_hz": (0.5, 20)}],
      [{"start": 1.0}, {"end": 1.1}, {"band_hz": (5, 20)}, {"measure": "band-energy"},
       *({"measure": "band-energy", "band_hz": band} for band in ((0, 20), (20, 20), (20, 5)))]),
-    (ComparisonChoice, {}, [{"sensors": ("a", "b")}, {"estimators": ("a", "b")}],
-     [{}, {"sensors": ("a", "b"), "estimators": ("c", "d")}, {"sensors": ("a", "a")}, {"sensors": ("a",)}]),
     (DeviceEntry, {"link": "emulated"}, [{}, {"faults": ("late",)}, {"link": "can0"}],
      [{"link": "can0", "faults": ("late",)}, {"link": ""}]),
     (ForceEntry, {"link": "can0", "device": "ati"}, [{}, {"sign": -1}], [{"sign": 0}, {"sign": 2}, {"range_n": 0.0}]),

@@ -22,8 +22,17 @@ ATOMS = [
         ("kgf", "N", 9.80665),
         ("mT", "uT", 1e3),
         ("V*A", "mW", 1e3),
+        ("mA", "A", 1e-3),
+        ("mK", "degC", 1e-3),
+        ("kHz", "1/s", 1e3),
+        ("deg", "rad", 0.017453292519943295),
+        ("%", "1", 0.01),
+        *((one, other, 1.0) for one, other in (
+            ("N", "kg*m/s/s"), ("Pa", "N/m/m"), ("J", "N*m"), ("W", "J/s"), ("V", "W/A"), ("S", "A/V"), ("ohm", "V/A"),
+            ("F", "A*s/V"), ("T", "N/A/m"), ("count", "count"), ("kg", "kg"),
+        )),
     ],
-)
+)  # fmt: skip
 def test_known_conversions(given_unit, wanted, factor):
     assert units.conversion(given_unit, wanted) == pytest.approx(factor, rel=1e-15)
 

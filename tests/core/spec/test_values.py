@@ -100,12 +100,11 @@ def test_quantities_have_the_tag_of_their_maker_and_times_are_whole_nanoseconds(
 
 
 def test_named_profiles_without_parameters():
-    stairs, press, sine = force_profiles.staircase(), force_profiles.press_hold_release(), force_profiles.sine()
+    stairs, sine = force_profiles.staircase(), force_profiles.sine()
     levels = [1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0]
     assert stairs.forces_n == (0, 0, *np.repeat(levels, 2))
     assert stairs.times_s == (0, 3, *np.cumsum([0.5, 3.0] * 10) + 3)
-    assert press.corners == ((0, 3, 4, 14, 15, 25), (0, 0, 5, 5, 0, 0))
-    assert (stairs.samples, press.samples, sine.samples) == (3800, 2500, 2800)
+    assert (stairs.samples, sine.samples) == (3800, 2800)
     t = np.array(sine.times_s[2:])
     assert (len(t), t[0], t[-1]) == (641, 4.0, pytest.approx(14.0))
     np.testing.assert_allclose(sine.forces_n[2:], 2 - np.cos(2 * np.pi * (t - 4)), atol=1e-9)
@@ -169,6 +168,10 @@ def test_a_scenario_takes_the_place_of_the_usual_nuisances_and_is_known_by_name(
         assert biotac.handled(name).nuisances == {**biotac.nuisances, **scenario.nuisances}
     with pytest.raises(NotApplicable, match="'no-such'"):
         biotac.handled("no-such")
+
+
+def test_the_spec_of_a_sensor_is_of_its_first_unit():
+    assert [Scene(name="s", unit=unit).first_unit for unit in ("1", "2")] == [True, False]
 
 
 def test_offsets_have_the_scale_of_drift_unless_they_have_their_own():

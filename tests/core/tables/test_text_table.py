@@ -3,14 +3,18 @@
 import builtins
 import math
 import shlex
+from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactbench.core.tables.html import html
 from tactbench.core.tables.markdown import markdown
+from tactbench.core.tables.numbers import delay, duration, interval, score, score_with_unit, signed, whole
 from tactbench.core.tables.terminal import plain_text
-from tactbench.core.tables.text import command_line, visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite, sort_value, text_table
+from tactbench.core.tables.text import command_line, cut, json_text, visible
+from tactbench.core.tables.text_table import Entry, TextTable, field_text, finite, records_table, sort_value, text_table
 
 
 def test_only_a_bare_finite_number_is_sorted_as_one_since_lines_may_have_several_units():
@@ -25,6 +29,39 @@ def test_a_column_that_says_nothing_is_not_shown_and_markdown_escapes_what_would
     assert [line.strip("| ").replace(" ", "") for line in lines[2:5]] == ["a|n", "---|---:", "x\\|&lt;b>|1"]
     assert lines[6] == "- note"
     assert plain_text([text_table("nothing", ("a",), [])]).startswith("nothing\n")
+
+
+@pytest.mark.parametrize(
+    ("shown", "expected"),
+    [
+        (score(0.12345, "1"), "0.123"), (score(9.99994, "N"), "9.9999"), (score(10.0, "N"), "10.00"),
+        (score(-10.0, "N"), "-10.00"), (score(-9.5, "N"), "-9.5000"), (score(None, "N"), "–"),
+        (interval(0.1, 0.2, "1"), "0.100 … 0.200"), (interval(0.1, None, "1"), "0.100 … open"),
+        (interval(None, 0.2, "1"), "–"), (signed(0.0, "1"), "+0.000"), (signed(-0.5, "N"), "−0.5000"),
+        (score_with_unit(0.5, "1"), "0.500"), (score_with_unit(0.5, "N"), "0.5000 N"),
+        *((duration(seconds), text) for seconds, text in (
+            (None, "–"), (0.0, "0.00 s"), (9e-7, "0.90 µs"), (9.994e-4, "999 µs"), (9.996e-4, "1.00 ms"),
+            (9.994e-3, "9.99 ms"), (9.996e-3, "10.0 ms"), (0.09994, "99.9 ms"), (0.09996, "100 ms"), (0.9996, "1.00 s"),
+            (1234.0, "1234 s"))),
+        (delay(None, {}), "–"), (delay(2.0, {"window": 1.0}), "≥ 2.00 ms"), (delay(2.0, None), "2.00 ms"),
+        (delay(2.0, {"window": 1.0, "link": 0.0}), "2.00 ms"), (delay(2.0, {"prediction": 1.0}), "2.00 ms"),
+        (whole(4400), "4\u202f400"), (whole(None), "–"), (cut("abcd", 4), "abcd"), (cut("abcde", 4), "abc…"),
+        (field_text({"a": [1, None, True], "b": None, "c": 0.123456}), "a = 1, , yes, c = 0.12346"),
+        (json_text({"a": [math.nan, -math.inf, (1.5,)]}), '{"a": [null, null, [1.5]]}'), (json_text("é"), '"\\u00e9"'),
+    ],
+)  # fmt: skip
+def test_numbers_and_values_are_shown_with_the_digits_that_they_need(shown, expected):
+    assert shown == expected
+
+
+def test_records_are_a_table_whose_numbers_are_sorted_and_long_texts_are_prose():
+    table = records_table("t", [{"a": 1.5, "b": "x"}, {"b": "y" * 60, "c": None}])
+    assert (table.columns, table.lines) == (("a", "b"), (("1.5", "x"), ("", "y" * 60)))
+    assert (table.right, table.wordy, sort_value(table.lines[0][0])) == ((True, False), False, 1.5)
+    assert records_table("t", [{"b": "y" * 61}], ("b",)).wordy
+    shown = html([replace(table, summary=("<1",), notes=("n",))])
+    assert shown.count("text-align: right") == shown.count("text-align: left") == 2
+    assert [text in shown for text in ("&lt;1", ">1.5<", "n<br>", "<th>b</th>")] == [True] * 4
 
 
 def test_text_is_returned_in_a_notebook_too(monkeypatch):

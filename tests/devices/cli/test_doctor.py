@@ -1,6 +1,7 @@
 """What this machine has for devices, and whether those of a rig answer."""
 
 import json
+from dataclasses import asdict
 from typing import ClassVar
 
 import numpy as np
@@ -28,23 +29,18 @@ devices:
 
 
 @pytest.fixture
-def doctor(tmp_path, monkeypatch):
+def doctor(tmp_path):
     """The verb, with the plugin of a pad and a scale on lines."""
-    monkeypatch.setattr("tactbench.devices.cli.host_devices.SLEEPS", 5)
     verbs = Verbs(tmp_path, here=True)
     return lambda *words, code=0: verbs("doctor", *words, code=code, plugins=("wired",)).stdout
 
 
-def test_what_does_not_work_comes_first_and_what_works_in_one_line(doctor):
-    code = 1 if any(one.state == "denied" for one in look_at_host()) else 0
-    *before, last = doctor(code=code).splitlines()
-    assert last.startswith("works ")
-    assert all(line.startswith(("WRONG ", "missing ")) for line in before)
-    about = json.loads(doctor("--format", "json", code=code))
-    named = {(one["kind"], one["name"]): one for one in about["host"]}
-    assert [name for kind, name in named if kind == "serial port"] == sorted(port.device for port in comports())
-    assert "5 ms" in named["clock", "clock"]["text"]
-    assert {"dask", "mcap", "spi"} <= {name for kind, name in named if kind == "extra"}
+def test_the_ports_of_this_machine_are_listed(doctor):
+    here = list(look_at_host())
+    about = json.loads(doctor("--format", "json", code=1 if any(one.denied for one in here) else 0))
+    assert about["host"] == list(map(asdict, here))
+    ports = [one["name"] for one in about["host"] if one["kind"] == "serial port"]
+    assert ports == sorted(port.device for port in comports())
 
 
 def test_what_is_wrong_with_the_devices_of_a_rig_file_comes_first_and_what_is_emulated_is_not_opened(tmp_path, doctor):
@@ -54,7 +50,7 @@ def test_what_is_wrong_with_the_devices_of_a_rig_file_comes_first_and_what_is_em
     motor = about["devices"][2]
     assert (motor["emulated"], motor["identity"], motor["problems"]) == (True, {}, [])
     assert [problem.partition(":")[0] for problem in about["problems"]] == ["wired-pad", "force"]
-    assert doctor(*asked, code=1).startswith(f"WRONG    {about['problems'][0]}")
+    assert doctor(*asked, code=1).startswith(f"WRONG  {about['problems'][0]}")
 
 
 TAXELS = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(3))

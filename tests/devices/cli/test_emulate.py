@@ -12,8 +12,9 @@ from tactbench.core.cli import main
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.devices.emulation.real_time import RealTimeDevices
 from tactbench.plugin import ForceRamp, Scene
-from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of, physics_of
+from tactbench.plugin.devices import RigFile, drivers_of, physics_of
 from tests.devices import talking
 
 POINTS = [
@@ -35,14 +36,11 @@ def emulate(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
 
     def call(*words, out=None, over=None):
-        real = EmulatedDevices.advance
-
-        def advance(self, until_ns):
-            real(self, until_ns)
+        def check(self):
             if over is None or over.is_set():
                 raise KeyboardInterrupt
 
-        monkeypatch.setattr(EmulatedDevices, "advance", advance)
+        monkeypatch.setattr(RealTimeDevices, "check", check)
         out = out or io.StringIO()
         monkeypatch.setattr("sys.stdout", out)
         with pytest.raises(SystemExit) as ended:

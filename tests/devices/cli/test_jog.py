@@ -1,5 +1,6 @@
 """One axis by small steps: halted by the force, let back, and refused what is not known to be safe."""
 
+import click
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from tactbench.devices.cli.jog import move_by_steps
 from tactbench.devices.emulation.line import split_faults
 from tactbench.plugin import load_object, load_registry
 from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices, EmulatorSettings
+from tests.conftest import ROOT, Verbs
 
 ENTRY = ForceEntry(device="net-ft", link="emulated", zero_s=0.1)
 CEILING_N, SKIN_M, N_M = 0.5, -2.5e-3, 2e3
@@ -18,7 +20,7 @@ MOTOR = {
 }  # fmt: skip
 
 
-def steps(*answers, faults=()):
+def steps(monkeypatch, *answers, faults=()):
     """Type answers; return what was asked and said, the largest force on the skin [N], and the motor at the end."""
     registry, heard, emulators = load_registry(), [], []
     pressed = [0.0]
@@ -29,11 +31,13 @@ def steps(*answers, faults=()):
 
     given = iter(answers)
 
-    def ask(text):
+    def ask(text, **_):
         heard.append(text)
         devices.advance(devices.clock() + 100_000_000)  # somebody thinks
         return next(given)
 
+    monkeypatch.setattr(click, "prompt", ask)
+    monkeypatch.setattr("tactbench.devices.cli.jog.remark", heard.append)
     motor, box = registry.devices["faulhaber"], registry.devices["net-ft"]
     emulators.append(load_object(motor.emulator)(EmulatorSettings(senses, np.random.default_rng(1), MOTOR)))
     emulators.append(
@@ -48,19 +52,19 @@ def steps(*answers, faults=()):
             DriverSettings(devices.opener("force"), options=box.emulated_options, clock=devices.clock)
         ) as force,
     ):
-        move_by_steps("motor", axis, force, ENTRY, CEILING_N, ask, heard.append)
+        move_by_steps("motor", axis, force, ENTRY, CEILING_N)
     return heard, max(pressed), emulators[0]
 
 
-def test_steps_go_where_they_are_typed_and_the_force_is_shown():
-    heard, largest_n, motor = steps("yes", "+", "-0.05", "")
+def test_steps_go_where_they_are_typed_and_the_force_is_shown(monkeypatch):
+    heard, largest_n, motor = steps(monkeypatch, "yes", "+", "-0.05", "")
     assert motor.position_m == pytest.approx(-2.95e-3, abs=1e-5)  # two corridors of the drive
     assert largest_n == 0.0
     assert "-2.90" in heard[2]
 
 
-def test_it_halts_at_the_ceiling_and_goes_back():
-    heard, largest_n, motor = steps("yes", "1", "+", "-0.6", "")
+def test_it_halts_at_the_ceiling_and_goes_back(monkeypatch):
+    heard, largest_n, motor = steps(monkeypatch, "yes", "1", "+", "-0.6", "")
     said = [text for text in heard if "ceiling" in text and ("was halted" in text or "no further" in text)]
     assert len(said) >= 2  # of the step, and of the next one
     # 1 mm/s for a look, the force's age and the drive's latency: some 20 ms, of 2 N/mm.
@@ -69,11 +73,20 @@ def test_it_halts_at_the_ceiling_and_goes_back():
 
 
 @pytest.mark.parametrize("answers", [("no",), ("",), ("yes", "2", "nan", "far", "")])
-def test_what_is_not_confirmed_too_long_or_no_number_moves_nothing(answers):
-    _, _, motor = steps(*answers)
+def test_what_is_not_confirmed_too_long_or_no_number_moves_nothing(monkeypatch, answers):
+    _, _, motor = steps(monkeypatch, *answers)
     assert motor.position_m == pytest.approx(-3e-3, abs=1e-9)
 
 
-def test_an_axis_does_not_move_on_without_a_force():
+def test_an_axis_does_not_move_on_without_a_force(monkeypatch):
     with pytest.raises(LinkUnplugged):
-        steps("yes", *["+"] * 20, faults=("unplug:start_s=3",))
+        steps(monkeypatch, "yes", *["+"] * 20, faults=("unplug:start_s=3",))
+
+
+def test_the_verb_opens_an_emulated_axis_of_a_rig_file(tmp_path, monkeypatch):
+    answers, example = iter(["yes", "+", ""]), str(ROOT / "examples" / "rigs" / "emulated.yaml")
+    monkeypatch.setattr(click, "prompt", lambda text, **_: next(answers))
+    doctor = Verbs(tmp_path, here=True)
+    doctor("doctor", "--rig-file", example, "--jog", "motor")
+    assert list(answers) == []
+    doctor("doctor", "--rig-file", example, "--jog", "joint-9", code=2)

@@ -1,18 +1,15 @@
-"""Devices in real time on links of this machine: by due times without a clock, and a short while by the wall clock."""
+"""Devices in real time on links of this machine."""
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 
 import pytest
 import serial
 
-from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
-from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-from tactbench.devices.emulation.line import Line, LinkFault
-from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter
+from tactbench.core.errors import LinkError, LinkUnplugged
+from tactbench.devices.emulation.real_time import RealTimeDevices, SlcanAdapter
 from tactbench.plugin.devices import open_link
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 from tests.devices.emulation.test_virtual_time import on, say
@@ -20,30 +17,15 @@ from tests.devices.emulation.test_virtual_time import on, say
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 
-@needs_pty
-def test_what_is_due_is_sent_and_nothing_before():
-    """Served at chosen moments: what is overdue is sent at once."""
-    end = PseudoTerminal("serial://{}?baud=9600")
-    server = RealTimeServer({"a": (Line(Recorder(period_s=0.01)), end)}, lambda: 0)
-    try:
-        with open_link(end.address) as link:
-            assert server.serve(0.0099) == pytest.approx(0.01)
-            with pytest.raises(LinkTimeout):
-                link.read(0.0)
-            assert server.serve(0.01) == pytest.approx(0.02)
-            assert link.read(1.0).data == bytes([0, 0, 0])
-            assert server.serve(0.0303) == pytest.approx(0.04)
-            data = link.read(1.0).data
-            assert data + (b"" if len(data) == 6 else link.read(1.0).data) == bytes([1, 0, 0, 2, 0, 0])
-    finally:
-        server.close()
+def opened(devices, name="a"):
+    return open_link(devices.addresses[name], devices.clock)
 
 
 @needs_pty
 @pytest.mark.parametrize("kind", ["bytes", "can", "datagram", "spi"])
 def test_requests_are_answered_by_the_wall_clock(kind):
     emulator = Complement() if kind == "spi" else Answerer(after_s=0.05)
-    with EmulatedDevices({"a": on(kind, emulator)}, time="real") as devices, devices.open_link("a") as link:
+    with RealTimeDevices({"a": on(kind, emulator)}) as devices, opened(devices) as link:
         before_ns = devices.clock()
         say(link)
         came = link.receive(5.0)
@@ -54,19 +36,13 @@ def test_requests_are_answered_by_the_wall_clock(kind):
 
 @needs_pty
 def test_an_unplugged_terminal_is_gone():
-    end = PseudoTerminal("serial://{}?baud=9600")
-    server = RealTimeServer({"a": (Line(Recorder(1.0), [LinkFault.parse("unplug:start_s=1.5")]), end)}, lambda: 0)
-    try:
-        with open_link(end.address) as link:
-            assert server.serve(1.0) == 1.5
-            assert link.read(1.0).data == b"\0\0\0"
-            assert server.serve(1.5) == math.inf
+    with RealTimeDevices({"a": on("bytes", Answerer())}) as devices:
+        with opened(devices) as link:
+            devices._open["a"][0]._unplugged_s = 0.0  # once it is open, however long that took
             with pytest.raises(LinkUnplugged):
-                link.read(1.0)
+                link.read(5.0)
         with pytest.raises(LinkError):
-            open_link(end.address)
-    finally:
-        server.close()
+            opened(devices)
 
 
 @pytest.mark.parametrize(
@@ -86,9 +62,8 @@ def test_the_adapter_carries_data_frames_while_it_is_open(told, answer):
 
 @needs_pty
 def test_a_terminal_does_not_echo_and_stays_for_the_next_host():
-    with EmulatedDevices({"a": on("bytes", Recorder(0.01))}, time="real") as devices:
+    with RealTimeDevices({"a": on("bytes", Recorder(0.01))}) as devices:
         port = devices.addresses["a"].removeprefix("serial://").partition("?")[0]
-        devices.advance(100_000_000)
         for _ in range(2):
             with serial.Serial(port, 115200, timeout=5.0) as host:
                 assert len(host.read(6)) == 6
@@ -100,13 +75,13 @@ def test_what_an_emulator_raises_unplugs_the_devices_and_is_raised():
         def feed(self, piece, now_s):
             raise ZeroDivisionError("a model that is wrong")
 
-    devices = EmulatedDevices({"a": on("bytes", Broken())}, time="real")
-    with devices.open_link("a") as link:
+    devices = RealTimeDevices({"a": on("bytes", Broken())})
+    with opened(devices) as link:
         link.write(b"x")
         with pytest.raises(LinkUnplugged):
             link.read(5.0)
     with pytest.raises(ZeroDivisionError):
-        devices.advance(0)
+        devices.check()
     devices.close()
     devices.close()
 
@@ -118,9 +93,9 @@ def test_ending_gives_everything_back():
 
     def use():
         models = {kind: on(kind, Complement() if kind == "spi" else Answerer()) for kind in ("bytes", "can", "spi")}
-        with EmulatedDevices({"udp": on("datagram", Answerer()), **models}, time="real") as devices:
+        with RealTimeDevices({"udp": on("datagram", Answerer()), **models}) as devices:
             for name in devices.addresses:
-                devices.open_link(name).close()
+                opened(devices, name).close()
 
     use()  # what libraries open once
     before = len(list(descriptors.iterdir()))

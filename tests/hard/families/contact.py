@@ -7,10 +7,10 @@ import numpy as np
 
 from tactbench.plugin import load_registry
 from tactbench.plugin.simulation import FluidBackedShell, SkinState
-from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.shell import with_core
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
 

@@ -12,8 +12,9 @@ from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings, ForceEntry
+from tactbench.devices.emulation.real_time import RealTimeDevices
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
-from tactbench.plugin.devices import EmulatedDevices, NamedDevice, RigFile, emulators_of
+from tactbench.plugin.devices import NamedDevice, RigFile, emulators_of
 from tests.devices.emulating import emulating
 
 REGISTRY = load_registry()
@@ -218,7 +219,7 @@ def test_the_steps_are_prompted_in_order_and_a_loaded_force_sensor_gets_no_zero(
     """Hands off, the zero, press now: the zero was taken after the prompt to press, from a hand that pressed."""
     somebody = Somebody()
     file = rig_file()
-    with EmulatedDevices(emulators_of(file, REGISTRY, "icub", lambda t_s: {"fz": 4.09}), time="real") as loaded:
+    with RealTimeDevices(emulators_of(file, REGISTRY, "icub", lambda t_s: {"fz": 4.09})) as loaded:
         counts = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
         entries = {name: {"link": address, "emulator": True} for name, address in loaded.addresses.items()}
         entries["force"]["options"] = counts

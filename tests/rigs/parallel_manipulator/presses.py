@@ -31,7 +31,7 @@ SLOW_LINE = {"baud": 2400}
 class Rig:
     """A guard, emulated devices and what presses."""
 
-    def __init__(self, kind, tmp_path, setting, address, force_driver, **faults):
+    def __init__(self, kind, tmp_path, setting, force_driver, **faults):
         self.setting = setting
         self.world = FAULTS.Pressed(setting, **faults)
         self.clock = self.world.clock
@@ -45,7 +45,7 @@ class Rig:
                     {
                         "motor": DeviceSettings(
                             f"{PACKAGE}.motor.driver:FaulhaberDriver",
-                            address or addresses["motor"],
+                            addresses["motor"],
                             options["motor"] | SLOW_LINE,
                         )
                     },
@@ -54,19 +54,10 @@ class Rig:
                 )
             )
 
-    def begin_anew(self):
-        """Disarm, and forget what was: for the next test with the same guard."""
-        self.guard.disarm()
-        for items in (self.guard.force_blocks, self.guard.motor_blocks, self.guard.events):
-            items.clear()
-        self.world.force.faults.clear()
-        self.world.sensed = lambda wrench, at_s: wrench
-        self.world.largest_n = 0.0
-
-    def press(self, change=lambda beat, since_s: beat, hold_s=0.1):
+    def press(self, change=lambda beat, since_s: beat, hold_s=0.1, most_s=15.0):
         """Press until it is over or the guard is no longer armed; return the press."""
         press = FAULTS.Press(self.guard, self.setting, self.clock, change, hold_s=hold_s)
-        press.run(15.0)
+        press.run(most_s)
         return press
 
     def ended(self, seconds=3.0):
@@ -85,17 +76,15 @@ class Rig:
 
 
 @contextmanager
-def rig(kind, tmp_path, setting=None, address=None, force_driver=NET_FT, **faults):
+def rig(kind, tmp_path, setting=None, force_driver=NET_FT, **faults):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
         setting = FAULTS.replace(setting, **PATIENT)
-    made = Rig(kind, tmp_path, setting, address, force_driver, **faults)
+    made = Rig(kind, tmp_path, setting, force_driver, **faults)
     try:
         made.guard.start()
         yield made
     finally:
-        try:
+        with made.world.devices:
             made.guard.close()
-        finally:
-            made.world.devices.close()

@@ -34,7 +34,7 @@ def test_a_sample_that_comes_again_is_no_touch_and_no_news():
     watched.take((1, 0.01), (2, 0.02))
     watched.take((3, 0.5), (3, 0.5), (4, 0.03), (3, 0.5))
     assert not watched.watch.touched(TOUCH_N)
-    assert (watched.watch.sequence, watched.watch.changed, watched.watch.force_n) == (4, 4, 0.03)
+    assert (watched.watch.received, watched.watch.changed, watched.watch.force_n) == (4, 4, 0.03)
     watched.take((5, 0.5))
     assert watched.watch.touched(TOUCH_N)
 

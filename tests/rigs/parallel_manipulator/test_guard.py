@@ -2,7 +2,6 @@
 
 import math
 import re
-import threading
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +11,9 @@ import pytest
 from tactbench.devices.guard_messages import GuardRefusesError, Trigger
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import Beat, CommandKind, GuardState, largest_force_n
-from tests.rigs.parallel_manipulator.presses import FAULTS, rig
+from tests.rigs.parallel_manipulator.presses import FAULTS, NET_FT, rig
+
+RAISING = "tests.rigs.parallel_manipulator.broken_force:RaisingDriver"
 
 
 def in_phase(name, change):
@@ -30,38 +31,100 @@ def made(tmp_path):
         yield one
 
 
-# In this process, and in one that is started for the test -------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", ["local", "process"])
 def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
+    """Through the wire of a guard in another process, too, with what is refused there and what it keeps back."""
     with rig(kind, tmp_path) as made:
+        guard, limits = made.guard, made.setting.limits
+        with pytest.raises(GuardRefusesError, match="ends"):
+            guard.arm(replace(limits, travel_m=(-7e-3, 2e-3)))
         press = made.press()
         assert press.phase == "over", press.reports[-1]
         assert press.reports[-1].state is GuardState.ARMED
         assert made.world.largest_n == pytest.approx(made.setting.setpoint_n, abs=0.3)
         armed_ns = press.reports[0].t_ns
-        blocks = [block for block in made.guard.force_blocks if block.t_ns[0] >= armed_ns]
-        moved = made.guard.motor_blocks
+        blocks = [block for block in guard.force_blocks if block.t_ns[0] >= armed_ns]
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
         # Raw and whole: every sample since it was armed, in order, as the sensor gave them.
         assert (np.diff(numbers) == 1).all()
         assert forces.shape[1] == 6
         assert forces[:, 2].max() == pytest.approx(made.world.largest_n, abs=0.05)
-        assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
+        assert np.concatenate([block.data for block in guard.motor_blocks])[:, 0].max() == pytest.approx(
             made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
         )
-        assert [event.text for event in made.guard.events] == ["started", "homing motor", "armed"]
-        assert made.guard.counts["guard"]["beats"] == press.sequence
-        assert made.guard.disarm().state is GuardState.IDLE
+        assert [event.text for event in guard.events] == ["started", "homing motor", "armed"]
+        assert guard.counts["guard"]["beats"] == press.sequence
+        # A rig that takes nothing for long gets its reports: 100 samples, which a full socket holds back.
+        before = len(guard.force_blocks)
+        guard.advance(made.clock() + round(0.4e9 * limits.heartbeat_s))
+        assert guard.beat(Beat(made.clock(), command=CommandKind.STEP, distance_m=math.nan)).reason
+        assert len(guard.force_blocks) > before
+        assert guard.disarm().state is GuardState.IDLE
         assert made.out
 
 
-# In a process that is started once ---------------------------------------------------------------------
+# In virtual time ------------------------------------------------------------------------------------------------------
 
 
-def force_goes_wrong(made, name, trigger):
+@pytest.mark.parametrize(
+    ("name", "trigger"), [("rig hangs", Trigger.BEAT_OLD), ("steps not numbers", Trigger.COMMANDS_REFUSED)]
+)
+def test_a_rig_that_goes_wrong(name, trigger, made):
+    change = FAULTS.changed({name: 0.0}, made.setting, made.clock)
+    made.press(lambda beat, since_s: change(beat, since_s) if beat.state == "ramp" else beat, most_s=3.0)
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+    assert made.out
+    assert made.world.largest_n < made.setting.allowed_n
+
+
+def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(made):
+    made.press(after(0.2, lambda beat: replace(beat, command=CommandKind.STEP, distance_m=1e-3)))
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.COMMANDS_REFUSED)
+    with pytest.raises(GuardRefusesError, match="fault"):
+        made.guard.arm(made.setting.limits)
+    again = made.guard.beat(Beat(made.clock(), command=CommandKind.STEP, distance_m=1e-6))
+    assert (again.accepted, again.state) == (False, GuardState.FAULT)
+    assert made.guard.disarm().state is GuardState.IDLE
+    assert made.press().phase == "over"
+
+
+def test_a_retreat_that_is_commanded_is_no_fault(made):
+    made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
+    assert made.out
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"travel_m": (-4e-3, 2e-3)}, "retreat"),
+        ({"travel_m": (-7e-3, 2e-3)}, "ends"),
+        ({"step_m": 1e-6}, "corridor"),
+        ({"zero": (0.0,) * 3}, "3 zeros"),
+        ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "while travelling"),
+    ],
+)
+def test_what_is_wrong_before_the_first_motion_is_refused(wrong, message, made):
+    before_m = made.world.position_m
+    with pytest.raises(GuardRefusesError, match=message):
+        made.guard.arm(replace(made.setting.limits, **wrong))
+    assert made.world.position_m == pytest.approx(before_m, abs=1e-9)
+    assert made.guard.arm(made.setting.limits).state is GuardState.ARMED
+
+
+@pytest.mark.parametrize(
+    ("name", "trigger"),
+    [
+        ("one sample above the ceiling", Trigger.FORCE_CEILING),
+        ("one torque above the ceiling", Trigger.TORQUE_CEILING),
+        ("force stuck", Trigger.FORCE_STUCK),
+    ],
+)
+def test_a_force_that_is_wrong(name, trigger, made):
     sensed = FAULTS.sensed({name: 0.0})
 
     def change(beat):
@@ -74,95 +137,14 @@ def force_goes_wrong(made, name, trigger):
     assert made.out
 
 
-@pytest.fixture(scope="class")
-def started_once(tmp_path_factory):
-    with rig("process", tmp_path_factory.mktemp("guard")) as one:
-        yield one
-
-
-@pytest.fixture
-def in_process(started_once):
-    started_once.begin_anew()
-    return started_once
-
-
-class TestInAProcess:
-    """What passes between a rig and a guard in another process: one of each class; the rest is in virtual time."""
-
-    @pytest.mark.parametrize(
-        ("name", "trigger"),
-        [("rig hangs", Trigger.BEAT_OLD), ("steps not numbers", Trigger.COMMANDS_REFUSED)],
-    )
-    def test_a_rig_that_goes_wrong(self, in_process, name, trigger):
-        change = FAULTS.changed({name: 0.0}, in_process.setting, in_process.clock)
-
-        def beats(beat, since_s):
-            changed = change(beat, since_s) if beat.state == "ramp" else beat
-            if changed is None:
-                # No beat for longer than is allowed; then the rig is back.
-                in_process.guard.advance(in_process.clock() + round(1.5e9 * in_process.setting.limits.heartbeat_s))
-                return beat
-            return changed
-
-        in_process.press(beats)
-        report = in_process.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
-        assert in_process.out
-        assert in_process.world.largest_n < in_process.setting.allowed_n
-
-    def test_a_force_that_is_too_large(self, in_process):
-        force_goes_wrong(in_process, "one sample above the ceiling", Trigger.FORCE_CEILING)
-
-    def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(self, in_process):
-        in_process.press(after(0.2, lambda beat: replace(beat, command=CommandKind.STEP, distance_m=1e-3)))
-        report = in_process.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.COMMANDS_REFUSED)
-        with pytest.raises(GuardRefusesError, match="fault"):
-            in_process.guard.arm(in_process.setting.limits)
-        again = in_process.guard.beat(Beat(in_process.clock(), command=CommandKind.STEP, distance_m=1e-6))
-        assert (again.accepted, again.state) == (False, GuardState.FAULT)
-        assert in_process.guard.disarm().state is GuardState.IDLE
-        assert in_process.press().phase == "over"
-
-    def test_a_retreat_that_is_commanded_is_no_fault(self, in_process):
-        in_process.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
-        report = in_process.ended()
-        assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
-        assert in_process.out
-
-    def test_what_is_wrong_before_the_first_motion_is_refused(self, in_process):
-        limits, before_m = in_process.setting.limits, in_process.world.position_m
-        for wrong, message in (
-            ({"travel_m": (-4e-3, 2e-3)}, "retreat"),
-            ({"travel_m": (-7e-3, 2e-3)}, "ends"),
-            ({"step_m": 1e-6}, "corridor"),
-            ({"zero": (0.0,) * 3}, "3 zeros"),
-            ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "while travelling"),
-        ):
-            with pytest.raises(GuardRefusesError, match=message):
-                in_process.guard.arm(replace(limits, **wrong))
-        assert in_process.world.position_m == pytest.approx(before_m, abs=1e-9)
-        assert in_process.guard.arm(limits).state is GuardState.ARMED
-
-    def test_a_rig_that_takes_nothing_for_long_gets_its_reports(self, in_process):
-        guard, limits = in_process.guard, in_process.setting.limits
-        guard.arm(limits)
-        assert guard.beat(Beat(in_process.clock())).accepted
-        # 100 samples, which a full socket holds back.
-        threading.Event().wait(0.4 * limits.heartbeat_s)
-        assert guard.beat(Beat(in_process.clock())).accepted
-        assert len(np.concatenate([block.data for block in guard.force_blocks])) > 50
-
-
-# In virtual time ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "trigger"),
-    [("one torque above the ceiling", Trigger.TORQUE_CEILING), ("force stuck", Trigger.FORCE_STUCK)],
-)
-def test_a_force_that_is_wrong(name, trigger, made):
-    force_goes_wrong(made, name, trigger)
+def test_an_error_of_a_driver_lets_the_motor_retreat(tmp_path):
+    with rig("local", tmp_path, force_driver=RAISING) as made:
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_LOST)
+        assert made.out
+        (event,) = [event for event in made.guard.events if event.trigger is Trigger.FORCE_LOST]
+        assert event.text.startswith("ZeroDivisionError: ")
 
 
 def test_what_came_before_it_was_armed_is_not_handed_over_afterwards(made):
@@ -239,7 +221,7 @@ def test_a_touch_on_a_fast_approach_ends_it(made):
         ("force_link", "unplug:start_s={0}", Trigger.FORCE_LOST),
         ("motor_link", "unplug:start_s={0}", Trigger.AXIS_LOST),
         ("motor", "motor-fault:start_s={0}", Trigger.AXIS_FAULT),
-        ("motor", "late-answers:start_s={0},delay_s=9", Trigger.AXIS_SILENT),
+        ("motor_link", "late:start_s={0}1,delay_s=9", Trigger.AXIS_SILENT),
     ],
     ids=lambda value: str(value).split(":")[0],
 )
@@ -320,13 +302,13 @@ def test_a_motor_that_would_fall_keeps_its_power(tmp_path, monkeypatch):
         assert made.world.motor.drive.enabled
 
 
-def test_force_while_homing_stops_the_motor(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        FAULTS, "STATED", FAULTS.STATED | {"homing": "end-stop", "homing_speed_m_s": 0.02, "home_m": 5.5e-3}
-    )
+@pytest.mark.parametrize(("driver", "why"), [(NET_FT, "while travelling"), (RAISING, "motor is at rest")])
+def test_force_or_an_error_of_a_driver_while_homing_stops_the_motor(driver, why, tmp_path, monkeypatch):
     # The end stop is 10 mm away, 5 mm behind the skin.
-    with rig("local", tmp_path) as made:
-        with pytest.raises(GuardRefusesError, match="while travelling"):
+    to_a_stop = {"homing": "end-stop", "homing_speed_m_s": 0.02, "home_m": 5e-3}
+    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | to_a_stop)
+    with rig("local", tmp_path, force_driver=driver) as made:
+        with pytest.raises(GuardRefusesError, match=why):
             made.guard.arm(made.setting.limits)
         assert made.world.largest_n < 0.2 + 20e3 * 0.02 * 20e-3
         assert made.guard.disarm().state is GuardState.IDLE
@@ -353,7 +335,7 @@ def test_an_axis_is_homed_where_it_stands_only_after_an_operators_word(made):
 
 def test_out_is_place_and_force(made):
     """The count is apart from the place: at its place of retreat there are 3 N left."""
-    made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.NONE)))
+    made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.NONE)), most_s=2.0)
     made.world.sensed = lambda wrench, at_s: [*wrench[:2], wrench[2] + 3.0, *wrench[3:]]
     report = made.guard.disarm()
     assert made.out

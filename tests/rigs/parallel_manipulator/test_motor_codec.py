@@ -55,7 +55,7 @@ def test_answers(sent, answer, lines):
     assert encode(*command) == sent.upper() + b"\r"
     assert LineReader().feed(answer) == lines
     for line in lines:
-        assert line.answers(command.name) == (line.kind is not Kind.NOTICE)
+        assert line.answers(command.name) == (line.kind is Kind.VALUE)
 
 
 def test_lines_cut_anywhere_have_the_time_of_their_first_byte():

@@ -5,14 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.rigs.parallel_manipulator.motor.codec import encode, line_time_s
-from tactbench.rigs.parallel_manipulator.motor.drive import Motion
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.plugin.devices import EmulatorSettings
+from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
+from tactbench.rigs.parallel_manipulator.motor.emulator import Motion, MotorEmulator
 
 
 def emulated(**options):
-    return MotorEmulator(None, np.random.default_rng(15), FaulhaberOptions(**options))
+    return MotorEmulator(EmulatorSettings(lambda at_s: {}, np.random.default_rng(15), options))
 
 
 def joined_bytes(sent):
@@ -44,21 +43,6 @@ def test_bytes_take_the_time_of_the_line():
     due_s = line_time_s(4, 19200) + 1e-3 + line_time_s(3, 19200)
     assert joined_bytes(emulator.poll(due_s - 25e-6)) == b"0"
     assert emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
-
-
-@given(st.lists(st.binary(max_size=30), max_size=8))
-@settings(max_examples=30)
-def test_the_drive_survives_any_bytes(pieces):
-    emulator, now_s = emulated(), 0.0
-    for piece in pieces:
-        emulator.feed(piece, now_s)
-        now_s += 0.02
-    emulator.feed(b"\rANSW2\r", now_s)
-    # What stood in the line may still be answered; then the position is.
-    now_s += 1.0
-    emulator.poll(now_s)
-    emulator.feed(encode("HO", 321) + encode("POS"), now_s)
-    assert joined_bytes(emulator.poll(now_s + line_time_s(200, 9600))).endswith(b"OK\r\n321\r\n")
 
 
 some = st.floats(5e-3, 1.0)

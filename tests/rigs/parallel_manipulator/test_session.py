@@ -5,7 +5,7 @@ import pytest
 
 from tactbench.plugin import RigError, load_registry
 from tactbench.plugin.devices import Beat, CommandKind, RigFile, ScenePhysics
-from tactbench.rigs.parallel_manipulator.kinematics import forward, solve_inverse
+from tactbench.rigs.parallel_manipulator.kinematics import forward
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
@@ -16,7 +16,6 @@ from tests.rigs.parallel_manipulator.test_press import RARER
 FILE = RigFile.model_validate(
     with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__reach_s_mm=[-15.0, 15.0], **RARER)
 )
-HOME_M = np.array([0.0, 0.0, -0.15])
 
 
 def drives(session):
@@ -25,10 +24,9 @@ def drives(session):
 
 
 def true_place_m(session):
-    """Return where the platform stands, whatever its drives count: they were switched on at the home place."""
-    delta = session.settings.manipulator
-    away = [drives(session)[name].position_m for name in JOINTS]
-    return forward(delta, solve_inverse(delta, HOME_M)[0] + away)
+    """Return where the platform stands, whatever its drives count."""
+    joints_m = np.array([drives(session)[name].position_m for name in JOINTS])
+    return forward(session.settings.manipulator, joints_m)
 
 
 class Force:

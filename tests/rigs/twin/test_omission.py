@@ -39,18 +39,6 @@ def _creep(sensor, scene):
     return named(plan.settled(carried_out(sensor, scene, 1, plan).settled))["creep"]
 
 
-def test_a_slow_ramp_goes_without_creep_and_the_bound_holds(sensors):
-    # 5 N in four hours: 1.1 counts/h behind at most.
-    scene = _slow()
-    entry = _creep(sensors["biotac"], scene)
-    assert not entry.included
-    (largest, bound), hidden = omitted(TWIN, sensors["biotac"], scene), _hidden(sensors["biotac"], scene)
-    assert bound == entry.change
-    # Not vacuous: within a factor of ten of what really happens, which is not nothing.
-    assert bound / 10 < largest <= bound
-    assert largest < hidden / 3
-
-
 OFF_THE_NOMINAL_PLACE = [
     ("biotac", {"radius": 2.0, "end": 12.0, "x": 4.0, "s": 1.0}),
     ("icub", {"radius": None, "x": -1.0, "s": 1.0, "tilt": 10.0}),

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import pytest
-from pydantic import ValidationError
 
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, RigContext, Scene, UsageError
@@ -102,8 +101,3 @@ def test_a_word_that_is_no_effect_is_refused_with_what_there_is_and_so_is_leavin
     assert "drift" in refused.value.hint
     with pytest.raises(NotApplicable, match="without transduction"):
         plan_scene(EFFECTS, _asking("-transduction"), specs["icub"])
-
-
-def test_a_rung_and_a_tolerance_are_one_too_many():
-    with pytest.raises(ValidationError, match="not both"):
-        Simulation(rung="fine", tolerance=0.1)

@@ -193,7 +193,7 @@ print(" ".join(mine))
     assert "contact.foam" in answer
     assert "effects.creep" in answer
     assert "effects.channels" in answer
-    for left_out in ("core", "shell", "layer"):
+    for left_out in ("shell", "layer"):
         assert f"contact.{left_out}" not in answer
     for left_out in ("force_loop", "friction", "heat", "skin_vibration"):
         assert f"effects.{left_out}" not in answer
@@ -206,8 +206,8 @@ def test_only_what_the_plan_includes_is_stepped(sensors, name):
     for effect in plan.stages:
         run.apply(effect)
     included = {entry.effect for entry in plan.settled(run.settled) if entry.included}
-    # The core is called upon by the contact, and counted there.
-    assert set(run.spent_s) | {"core"} == included | {"core"}
+    # What the contact's solver applies is counted there.
+    assert set(run.spent_s) == included - {"core", "fluid-pressure", "shear"}
     # Nothing is allocated for channels nobody looks at, nor for clocks nobody needs.
     assert [track.clock for track in run.tracks] == [""]
     assert {channel.kind for track in run.tracks for channel in track.channels} == {"taxel"}

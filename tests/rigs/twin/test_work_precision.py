@@ -13,7 +13,7 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
 from tactbench.rigs.twin import work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
+from tactbench.rigs.twin.fidelity import RUNGS
 from tactbench.rigs.twin.preparation import prepare
 from tests.conftest import THIRD_PARTY
 from tests.rigs.twin.conftest import TWIN, q
@@ -35,8 +35,6 @@ def _little(monkeypatch):
     """The same diagram with one contact, two loads and few ways: its rows are judged here, not its numbers."""
     monkeypatch.setattr(work_precision, "RADII_MM", (10.0,))
     monkeypatch.setattr(work_precision, "LOADS", 2)
-    monkeypatch.setattr(work_precision, "GRIDS", (1.0,))
-    monkeypatch.setattr(work_precision, "NODES", (8, DEFAULT.most_nodes))
     monkeypatch.setattr(work_precision, "_REFERENCE", RUNGS["default"])
 
 
@@ -46,10 +44,10 @@ def test_it_runs_for_a_skin_and_says_what_it_cannot_have(sensors, name, has_it):
     found = list(measured(work_precision.study(sensors[name], rounds=1), name, Progress()))
     skipped = [one for one in found if isinstance(one, Skipped)]
     points = [one for one in found if one not in skipped]
-    assert any(point.default and point.rung == "default" for point in points)
-    assert all(one.label.startswith("closed form") and one.reason for one in skipped)
-    assert ("closed-form" in {one.rung for one in skipped}) is not has_it
-    assert ("closed-form" in {point.rung for point in points}) is has_it
+    assert "default" in {point.label for point in points}
+    assert all(one.label == "closed-form" and one.reason for one in skipped)
+    assert ("closed-form" in {one.label for one in skipped}) is not has_it
+    assert ("closed-form" in {point.label for point in points}) is has_it
 
 
 @pytest.mark.parametrize("radius", [None, 2.0])

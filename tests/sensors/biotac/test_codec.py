@@ -7,13 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.sensors.biotac.codec import (
-    CLOCK,
-    COMMAND_RATE,
     INDEX,
     PROPERTIES,
-    SAMPLING_PAUSE,
     STREAMING_INDEX,
-    WORD_PAUSE,
     Fault,
     decoded,
     encoded,
@@ -118,15 +114,6 @@ def test_bt_6_conversions_by_the_spec_s_numbers():
     # The manual's formula for TAC lies outside its own range: it stays in counts.
     (tac,) = SPEC.channels("ac_temperature")
     assert tac.scale is tac.measures is None
-
-
-def test_bt_6_times():
-    word_s, pause_s = 16.0 / CLOCK.to("Hz"), SAMPLING_PAUSE.to("s")
-    assert word_s == pytest.approx(3.636e-6, abs=5e-10)
-    assert 1.0 / COMMAND_RATE.to("Hz") == pytest.approx(227.273e-6, abs=5e-10)
-    # Printed with two decimals.
-    assert 2 * word_s + pause_s == pytest.approx(57.27e-6, abs=5e-9)
-    assert word_s + pause_s + 3 * (word_s + WORD_PAUSE.to("s")) == pytest.approx(94.55e-6, abs=5e-9)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
-from tactbench.sensors.biotac.sheet import Faces, FilmSheet
+from tactbench.sensors.biotac.conduction import Disc, Faces, FilmSheet, RimmedDiscs
 
 RADIUS, RING = 0.6, 3.0
 

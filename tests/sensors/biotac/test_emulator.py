@@ -70,11 +70,6 @@ def test_bt_4_properties(command, name, answer):
     assert one_by_one == golden + b"\xff"
 
 
-def test_bt_4_no_sensor():
-    sensor = Emulator(faults=[BioTacFault("not-connected")])
-    assert exchange(sensor, b"\x61\x15", 1) == b"\xff"
-
-
 @pytest.mark.parametrize(
     ("command", "pause_s", "answer"),
     [("6112", 50e-6, "A545"), ("6192", 50e-6, "A53F"), ("4013", 50e-6, "A552"), ("6113", 10e-6, "A52E")],

@@ -20,7 +20,6 @@ from tactbench.sensors.icub.codec import (
     command_frame,
     read_command,
     read_version,
-    reading,
     skin_frames,
     version_frame,
 )
@@ -69,14 +68,6 @@ WORDS = """
     0550:0,2,4,6 00F0:0,1,2,3 0F00:4,5,6,7 F000:8,9,10,11
 """
 """Bytes 6 and 7 of the tail, and taxels out of range; 1 is no acknowledgement, 2 not connected, 4 and 8 reserved."""
-
-CHANGES = {
-    (240, 2): "0 240, 1 240, 3 240, 4 239, 40 230, 400 140, 956 1, 959 1, 960 0, 1919 0, 1920 0*, -1 241, -4 241, "
-    "-5 242, -59 255, -60 255, -119 255, -120 255*",
-    (245, 2): "0 245, 4 244, 400 145, 979 1, 980 0, 1960 0*, -1 246, -39 255, -40 255, -79 255, -80 255*",
-    (240, 0): "0 240, 1 239, 100 140, 239 1, 240 0, 479 0, 480 0*, -1 241, -14 254, -15 255, -30 255*",
-}
-"""(reading at rest, shift) -> change and byte, with a star where the taxel is called out of range."""
 
 
 def frame(identifier, data):
@@ -130,15 +121,6 @@ def test_error_words(entry):
     wrong = {f"T{taxel + 1} out of range": 1 for taxel in taxels}
     wrong |= {"samples not acknowledged": 1} if word & 1 else {}
     assert counts == wrong | ({"samples not connected": 1} if word & 2 else {})
-
-
-@pytest.mark.parametrize(
-    ("rest", "shift", "entry"),
-    [(rest, shift, entry) for (rest, shift), entries in CHANGES.items() for entry in entries.split(", ")],
-)
-def test_readings_ic_4(rest, shift, entry):
-    change, wanted = entry.split()
-    assert reading(int(change), rest, shift) == (int(wanted.rstrip("*")), wanted.endswith("*"))
 
 
 def test_version_as_the_firmware_lays_it_out():

@@ -1,6 +1,5 @@
 """The fingertip's driver against emulated boards, in virtual time."""
 
-import math
 from contextlib import contextmanager
 
 import numpy as np
@@ -14,19 +13,18 @@ from tactbench.plugin.devices import (
     DriverSettings,
     LinkError,
 )
-from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BoardSetup,
     OldSetup,
     OldSetup2,
     Transmit,
     TriangleSetup,
-    command_frame,
     read_command,
     skin_frames,
 )
 from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver
-from tactbench.sensors.icub.emulator import BoardFault, Bus
+from tactbench.sensors.icub.emulator import BoardFault
+from tactbench.sensors.icub.spec import STREAMS
 from tests.sensors.icub.emulated import (
     NAMES,
     VirtualLink,
@@ -274,23 +272,6 @@ def test_options_that_cannot_be_are_refused_before_the_link_is_opened(options, s
         FingertipDriver(DriverSettings(lambda: pytest.fail("opened"), STREAMS, options))
     with pytest.raises(UsageError, match=said):
         emulator(**options)
-
-
-@given(st.lists(st.floats(0.0, 0.5), max_size=20))
-@settings(max_examples=10, deadline=None)
-def test_how_often_a_board_is_polled_changes_nothing(times):
-    def fresh():
-        faults = [
-            BoardFault("dropped-frame", every=3),
-            BoardFault("doubled-frame", half="head"),
-            BoardFault("late-answer", every=5, delay_s=0.039),
-        ]
-        bus = Bus(lambda now_s: {"T1": 200 + 50 * math.sin(7 * now_s)}, triangle=3, faults=faults)
-        bus.feed(command_frame(14, Transmit(True)), 0.0)
-        return bus
-
-    bus = fresh()
-    assert [frame for now_s in [*sorted(times), 0.5] for frame in bus.poll(now_s)] == fresh().poll(0.5)
 
 
 @pytest.mark.parametrize("fault", ["unheard-of", "stuck-taxel:channels=T13"])

@@ -56,7 +56,6 @@ def test_a_log_holds_what_the_driver_read(tmp_path, suffix):
     (stream,) = log.streams
     assert stream.rate_hz == pytest.approx(50.0, rel=1e-3)
     assert stream.rate_source.tag == "measured"
-    assert len(log.remarks) == 2  # where the period is from, and how the board was set up
 
 
 def test_one_of_several_fingertips_is_chosen(tmp_path):
@@ -78,14 +77,6 @@ def test_early_firmware_is_read_when_asked_for(tmp_path):
     with pytest.raises(DataError, match="old_ids"):
         read_log(file, {})
     assert len(read_log(file, {"old_ids": True}).blocks[0].data) == 3
-
-
-def test_the_period_can_be_stated(tmp_path):
-    file = write(tmp_path / "log.asc", pairs(0))
-    with pytest.raises(UsageError, match="period_ms"):
-        read_log(file, {})
-    log = read_log(file, {"period_ms": 50})
-    assert (log.streams[0].rate_hz, log.streams[0].rate_source.tag) == (20.0, "assumed")
 
 
 def test_times_that_go_back_keep_samples_out(tmp_path):
@@ -110,3 +101,5 @@ def test_what_cannot_be_read_is_refused(tmp_path):
     file = write(tmp_path / "log.asc", [CanFrame(0x4E0, b"\x40\x01"), CanFrame(0x4E0, b"\x40\x01", t_ns=20_000_000)])
     with pytest.raises(DataError, match="board 14"):
         read_log(file, {})
+    with pytest.raises(DataError, match="period"):
+        read_log(write(tmp_path / "short.asc", pairs(0)), {})

@@ -54,15 +54,6 @@ def test_the_average_over_a_taxel_converges_with_the_square_of_the_cell():
     assert finer < default / 3.5  # 4, less the error of the finest grid itself
 
 
-def test_a_taxel_weight_adds_to_one_wherever_it_falls():
-    for shift in (0.0, 0.1, 0.21):
-        weight = taxel_weight(GRID, (1.0 + shift, -2.0 + shift), 1.25)
-        assert weight.sum() == pytest.approx(1.0, abs=1e-12)
-        centre = (weight.sum(axis=1) @ GRID.x_mm, weight.sum(axis=0) @ GRID.s_mm)
-        # Sub-sampling is symmetric to a sixteenth of a cell.
-        assert centre == pytest.approx((1.0 + shift, -2.0 + shift), abs=0.42 / 16)
-
-
 def test_the_weight_is_flat_over_the_taxel():
     grid = grid_of(SPEC, 4)
     density = taxel_weight(grid, (0.0, 0.0), 1.25) / np.prod(grid.cell_mm)

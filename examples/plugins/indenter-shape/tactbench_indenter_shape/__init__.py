@@ -6,7 +6,7 @@ released, so that neither the place nor the force tells the shape.
 
 from tactbench.plugin import (  # noqa: I001
     Indenter, IndenterDescriptor, LabelTarget, Parameter, Placement, PlannedScene, Scene, TaskDescriptor, TaskSpec,
-    assumed, hookimpl, press_hold_release,
+    assumed, hookimpl, staircase,
 )  # fmt: skip
 
 TACTBENCH_API = 2
@@ -30,7 +30,7 @@ def planned(role: str, shape: str, number: int) -> PlannedScene:
     scene = Scene(
         name=f"{shape}-{number}-{role}", indenter=Indenter(shape=shape, dimensions=SHAPES[shape], **angle),
         placement=Placement(x=assumed(PLACES_MM[role][number], "mm", WHY)), session=role, labels={"shape": shape},
-        profile=press_hold_release(peak=2, rise=2, dwell=4, release=0.1, rest=0, rate=20),
+        profile=staircase(peak=2, steps=1, rise=2, dwell=4, rate=20),
     )  # fmt: skip
     return PlannedScene(role=role, scene=scene, drawn_order=f"shapes-{role}")
 

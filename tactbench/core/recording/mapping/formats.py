@@ -23,7 +23,6 @@ from tactbench.core.recording.mapping.channels import fill
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Time, Xlsx
 from tactbench.core.recording.mapping.table import (
     Table,
-    TextTable,
     Used,
     nanoseconds_per,
     no_column,
@@ -123,9 +122,8 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         If the file has another format or lacks an array, or an array has the wrong shape or type.
     """
     hint = "Store plain arrays (numpy.save, numpy.savez, -v7 of MATLAB); pickled objects are refused."
-    names = {name: fill(name, known, shown) for name in (how.array, *how.per_recording.values())}
     with whole(shown, f"file of `format: {how.format}`", hint):
-        arrays = _load(path, shown, how, names)
+        arrays = _load(path, shown, how, known)
     values = arrays[how.array]
     if values.ndim != len(how.axes) or values.dtype.kind not in "iufb" or not values.size:
         raise MappingError(
@@ -151,35 +149,30 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         yield {"index": f"{index:0{wide}d}", **words}, Table(where, tuple(columns), range(len(rows)), columns)
 
 
-def _load(path: Path, shown: str, how: Arrays, names: Words) -> dict[str, Array]:
-    """Return arrays by name; `names` gives each name with its words replaced, for `npy` the name of a file."""
+def _load(path: Path, shown: str, how: Arrays, known: Words) -> dict[str, Array]:
+    """Return the arrays that `how` names; with `npy`, each is in a file of its own."""
+    axes = dict.fromkeys(how.per_recording.values(), 1) | {how.array: len(how.axes)}
     if how.format == "npy":
-        files = {name: path.parent / file if file else path for name, file in names.items()}
+        files = {name: path.parent / fill(name, known, shown) if name else path for name in axes}
         return {name: np.load(file, allow_pickle=False) for name, file in files.items()}
-    if how.format == "mat":
-        axes = {name: len(how.axes) if name == how.array else 1 for name in names}
-        content = importlib.import_module("scipy.io").loadmat(path)
-        found: dict[str, Any] = {
-            name: _shaped(content[name], axes.get(name, 0)) for name in content if not name.startswith("__")
-        }
-    else:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] if name in names else None for name in archive.files}
-    for name in names:
-        if name not in found:
-            hint = f"{did_you_mean(name, found)}Its arrays: {', '.join(sorted(found))}."
-            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
-    return found
+    mat = how.format == "mat"
+    with path.open("rb") as opened:
+        found = importlib.import_module("scipy.io").loadmat(opened) if mat else np.load(opened, allow_pickle=False)
+        arrays = [name for name in found if not name.startswith("__")]
+        for name in axes:
+            if name not in arrays:
+                hint = f"{did_you_mean(name, arrays)}Its arrays: {', '.join(sorted(arrays))}."
+                raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+        return {name: _shaped(found[name], count) if mat else found[name] for name, count in axes.items()}
 
 
 def _shaped(values: Array, axes: int) -> Array:
     """Return an array with `axes` axes; MATLAB stores n values as (n, 1) or (1, n), and drops last axes of length 1."""
-    if axes < 2 and values.ndim == 2 and 1 in values.shape:
-        return values.reshape(-1)
-    return values.reshape(values.shape + (1,) * (axes - values.ndim))
+    shape = (-1,) if axes < 2 and 1 in values.shape else values.shape + (1,) * (axes - values.ndim)
+    return values.reshape(shape)
 
 
-def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
+def read_sheet(path: Path, shown: str, how: Xlsx) -> Table:
     """Return the table in one sheet of a workbook, with the values that Excel has stored for its formulas.
 
     Raises
@@ -272,26 +265,22 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, T
         for name, (_, used, _) in topics.items()
     }
     counts = dict.fromkeys(topics, 0)
-    decoders: dict[int, tuple[list[str], Any]] = {}
-    schemas: dict[int, Any] = {}
+    decoders: dict[int, Any] = {}
     seen: set[str] = set()
-    stream, ros = extra("mcap", shown, "mcap.stream_reader", "mcap_ros2.decoder")
+    reader, ros = extra("mcap", shown, "mcap.reader", "mcap_ros2.decoder")
     damaged = whole(shown, "bag", "If its recorder was killed: `mcap recover` keeps the part that can be read.")
     with damaged, path.open("rb") as opened:
-        # The records end at the bag's footer, which a bag that was cut short has not.
-        for record in stream.StreamReader(opened, validate_crcs=True).records:
-            kind = type(record).__name__
-            if kind == "Message":
-                names, decode = decoders.get(record.channel_id, ((), None))
-                for name in names:
-                    _take(record, decode, topics[name], values[name], f"{shown}, message {counts[name]} of {name}")
+        # In the order of the file, which ends with the bag's footer; a bag that was cut short has none.
+        bag = reader.NonSeekingReader(opened, validate_crcs=True).iter_messages(log_time_order=False)
+        for schema, channel, record in bag:
+            seen.add(channel.topic)
+            for name, wanted in topics.items():
+                if wanted[0].topic == channel.topic:
+                    if channel.id not in decoders:
+                        decoders[channel.id] = _decoder(ros, channel, schema, shown)
+                    where = f"{shown}, message {counts[name]} of {name}"
+                    _take(record, decoders[channel.id], wanted, values[name], where)
                     counts[name] += 1
-            elif kind == "Schema":
-                schemas[record.id] = record
-            elif kind == "Channel" and record.id not in decoders:
-                seen.add(record.topic)
-                names = [name for name, (how, *_) in topics.items() if how.topic == record.topic]
-                decoders[record.id] = names, names and _decoder(ros, record, schemas.get(record.schema_id), shown)
     tables = {}
     for name, (how, used, clock) in topics.items():
         topic = how.topic

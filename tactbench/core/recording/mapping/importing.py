@@ -129,11 +129,8 @@ def import_tables(
     sensor, streams = sensor_of(loaded)
     tasks = _tasks_text(loaded)
     sets, left_out = find(loaded, mapping.parent if root is None else root)
-    beside: list[Finding] = []
-    if left_out:
-        more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
-        text = f"the import left files out: {left_out[0]}{more}"
-        beside.append(Finding("left-out", "warning", text))
+    more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
+    beside = [Finding("left-out", "warning", f"the import left files out: {text}{more}") for text in left_out[:1]]
     made: list[Imported] = []
     shapes: dict[str, Shape] = {}
     origins: dict[str, str] = {}
@@ -156,12 +153,12 @@ def import_tables(
         if tasks and not replace and target.exists() and target.read_text(encoding="utf-8") != tasks:
             raise MappingError(f"{target} exists already and declares other tasks.", hint=_OTHERWISE)
         _write_tasks(folder, tasks)
-        placed = _in_place(made, out, replace=replace)
+        placed = [_in_place(one, out, replace=replace) for one in made]
         with writable(out):
             _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
-    shown = {file.shown for one in sets for file in one.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(unused_columns(shapes)))
+    count = len({file for one in sets for file in one.files.values()})
+    return ImportReport(loaded.title, tuple(placed), count, names, left_out, tuple(unused_columns(shapes)))
 
 
 def import_log(
@@ -269,13 +266,13 @@ def aside(out: Path) -> Iterator[Path]:
                 if free and left.name.startswith(PLACING):
                     _place(left, out)
                 elif free:
-                    _remove(left)
+                    shutil.rmtree(left, ignore_errors=True)
         folder = Path(mkdtemp(prefix=WAITING, dir=out))
     try:
         with _locked(folder):
             yield folder
     finally:
-        _remove(folder)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
@@ -288,15 +285,11 @@ def _locked(folder: Path) -> Iterator[bool]:
         os.close(lock)
 
 
-def _remove(folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-
-
 def _place(folder: Path, out: Path) -> None:
-    """Move the recordings in `folder` to `out`; while the folder exists, rigs do not replay `out`."""
+    """Move the recordings in `folder` to `out`, and remove it; while it exists, rigs do not replay `out`."""
     for path in sorted(folder.glob("[!.]*")):
         path.replace(out / path.name)
-    _remove(folder)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write(
@@ -364,10 +357,12 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict
             hint="Use letters, digits, dots, dashes and underscores; translate words under `words`.",
         )
     reasons = [one.reason for one in mapping.exclude if any(fnmatchcase(file, one.files) for file in raw.files)]
-    unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
-    remarks = [f"The meaning of time zero in table {name} is not known." for name in unknown]
-    if mapping.clock == "none":
-        remarks = ["No clock: the source gives no times and no rate, only the order of rows."]
+    remarks = [] if mapping.clock != "none" else [
+        "No clock: the source gives no times and no rate, only the order of rows."
+    ]  # fmt: skip
+    for name, table in mapping.tables.items():
+        if table.time and table.time.epoch == "unknown":
+            remarks.append(f"The meaning of time zero in table {name} is not known.")
     about = {one: fill(getattr(mapping.sensor, one), words, f"sensor.{one}") for one in ("name", "title")}
     try:
         return RecordingMeta.model_validate(given | {
@@ -403,15 +398,14 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
     return known[given]
 
 
-def _in_place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Return the recordings with their paths in `out`; those already there with the same content are not moved."""
-    for one in made:
-        target = out / one.path.name
-        if target.exists() and not replace:
-            there = ""
-            with suppress(RecordingError):
-                there = content_digest(target)
-            if there != content_digest(one.path):
-                raise MappingError(f"{target} exists already, and differs from what would be written.", hint=_OTHERWISE)
-            one.path.unlink()
-    return [replaced(one, path=out / one.path.name) for one in made]
+def _in_place(made: Imported, out: Path, *, replace: bool) -> Imported:
+    """Return a recording with its path in `out`; if it is already there with the same content, it is not moved."""
+    target = out / made.path.name
+    if target.exists() and not replace:
+        there = ""
+        with suppress(RecordingError):
+            there = content_digest(target)
+        if there != content_digest(made.path):
+            raise MappingError(f"{target} exists already, and differs from what would be written.", hint=_OTHERWISE)
+        made.path.unlink()
+    return replaced(made, path=target)

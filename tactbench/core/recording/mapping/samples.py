@@ -31,9 +31,8 @@ UNSIGNED_BITS = (8, 16, 32)
 """Widths of whole numbers whose negative values may have been stored without their sign."""
 MISSED = 0.05
 """Largest share of the longest table's time span that the tables may not have in common, without a report."""
-YEARS = (1970, 2200)
-"""Years outside which times since 1970 count as times in a wrong unit or of a wrong epoch."""
-_NS_PER_YEAR = 365.2425 * 86400 * 1e9
+FIRST, LAST = "1971-01-01", "2200-01-01"
+"""Dates outside which times since 1970 count as times in a wrong unit, or of a clock that starts at zero."""
 
 
 def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[StreamData, list[Finding]]:
@@ -91,13 +90,14 @@ def times(table: Table, time: Time) -> IntArray:
                 hint="Correct `wraps_at` under `time`.",
             )
         stamps = stamps + period * np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -period / 2)
-    years = 1970 + stamps / _NS_PER_YEAR
-    # Anything below a year after 1970 is a clock that starts at zero, not one of that epoch.
-    for row in np.flatnonzero((years < YEARS[0] + 1) | (years > YEARS[1])) if time.epoch == "unix" else ():
-        raise MappingError(
-            f"{table.where(row)}: column {time.column!r} in {time.unit} since 1970 would be the year {years[row]:.0f}.",
-            hint="Correct the unit, or write `epoch: start` or `epoch: unknown`.",
-        )
+    dates = stamps.astype("M8[ns]")
+    for row in np.flatnonzero((dates < np.datetime64(FIRST)) | (dates > np.datetime64(LAST))):
+        if time.epoch == "unix":
+            year = dates[row].astype("M8[Y]")
+            raise MappingError(
+                f"{table.where(row)}: column {time.column!r} in {time.unit} since 1970 would be the year {year}.",
+                hint="Correct the unit, or write `epoch: start` or `epoch: unknown`.",
+            )
     return stamps + round(time.offset_s * 1e9)
 
 
@@ -179,16 +179,16 @@ def _kind(source: TableSource) -> str:
 def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
     """Yield a finding for each number that seems to be no reading, in the (n, channels) numbers of a table.
 
-    Such numbers are set to NaN in `given`, so that the search for further ones ignores them.
+    Such numbers, and channels whose numbers lost their sign, are set to NaN in `given`, so that the search for further
+    ones ignores them.
     """
     found: dict[str, dict[int, int]] = {}
     low, high = np.fmin.reduce(given), np.fmax.reduce(given)
-    sound = np.ones(given.shape[1], dtype=bool)
     for period in (2**bits for bits in UNSIGNED_BITS):
         for place in np.flatnonzero((low >= 0) & (low < 0.1 * period) & (high > 0.9 * period) & (high < period)):
             jumps = _jumps(given[:, place], period)
             if jumps:
-                sound[place] = False
+                given[:, place] = np.nan
                 text = f"jumps between 0 and {period} in {{:g}} % of the rows, as if negative numbers lost their sign"
                 found.setdefault(text, {})[int(place)] = jumps
     rows = np.isfinite(given).sum(axis=0)
@@ -199,7 +199,7 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
         first, last = np.fmin.reduce(others), np.fmax.reduce(others)
         off = np.minimum(np.abs(extreme - first), np.abs(extreme - last)) / np.maximum(last - first, 1e-300)
         count = at.sum(axis=0)
-        places = np.flatnonzero(sound & (2 * count <= rows) & ((count > 2) | (off > OUTSIDE)))
+        places = np.flatnonzero((2 * count <= rows) & ((count > 2) | (off > OUTSIDE)))
         candidates += [(float(off[place]), int(place), float(extreme[place])) for place in places]
     for far, channel, value in sorted(candidates, reverse=True):
         if _is_apart(given[:, channel], value, far):

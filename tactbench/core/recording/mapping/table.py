@@ -8,7 +8,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
@@ -46,9 +46,11 @@ class Table:
     places: Sequence[int]
     """Place of each row in the file: its line, or its number from 0."""
     values: Mapping[Column, Sequence[Any]]
-    """Values of each column that can be read, (n,): an array or a list."""
+    """Values of each column that can be read, (n,): an array or a list; texts by place, and by unique name."""
     row: str = ", row "
     """Text between the file and the place of a row in messages."""
+    how: Tabular | None = None
+    """Notation of the cells of a text file or a sheet; None: the values have types."""
 
     def __len__(self) -> int:
         return len(self.places)
@@ -68,20 +70,24 @@ class Table:
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a column, (n,), with NaN where there is no sample; raises MappingError for a cell without a number."""
-        values = self._numbers(column)
-        wrong = np.flatnonzero(np.isinf(values))
-        if len(wrong):
-            raise self._refusal(int(wrong[0]), column, "number")
-        return values
+        values = self._column(column)
+        if self.how is not None:  # readings repeat: most columns hold few texts
+            number = {text: self._number(text) for text in {*values}}
+            values = [number[text] for text in values]
+        found = np.asarray(values, dtype=np.float64)
+        for row in np.flatnonzero(np.isinf(found)):
+            raise self._refusal(row, column, "number")
+        return found
 
     def nanoseconds(self, time: Time) -> IntArray:
         """Return the times of the rows, (n,) [ns], rounded once; raises MappingError for a cell without a time."""
         per_unit, stamps = nanoseconds_per(time), np.empty(len(self), dtype=np.int64)
-        for row, value in enumerate(self._stamps(time.column)):
+        for row, value in enumerate(self._plain(time.column)):
             try:
                 date = _DATE.fullmatch(value) if isinstance(value, str) else None
                 # Seconds since 1970 in float64 are exact to 0.2 µs only; their decimal text is exact.
-                stamps[row] = _since_1970(date, time) if date else round(Decimal(value) * per_unit)
+                number = self._as_python(value) if isinstance(value, str) else value
+                stamps[row] = _since_1970(date, time) if date else round(Decimal(number) * per_unit)
             except MappingError as error:
                 message = f"{self.where(row)}: column {time.column!r}: {error.message}"
                 raise MappingError(message, hint=error.hint) from error
@@ -92,66 +98,26 @@ class Table:
     def _column(self, column: Column) -> Sequence[Any]:
         if column not in self.values:
             raise no_column(self.shown, column, self.columns)
-        return self.values[column]
-
-    def _plain(self, column: Column) -> Iterable[Any]:
-        values = self._column(column)
-        return values.tolist() if isinstance(values, np.ndarray) else values
-
-    def _stamps(self, column: Column) -> Iterable[Any]:
-        """Return a column of times as texts of dates, or as numbers in Python's notation."""
-        return self._plain(column)
-
-    def _numbers(self, column: Column) -> FloatArray:
-        """Return a column, (n,), with NaN for no sample, and infinity for a cell that is not a number."""
-        return np.asarray(self._column(column), dtype=np.float64)
-
-    def _refusal(self, row: int, column: Column, wanted: str) -> MappingError:
-        """Return the error for a cell that is not a number or time, as `wanted`."""
-        text = f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}."
-        return MappingError(text, hint=self._hint(row, column, wanted))
-
-    def _hint(self, _row: int, _column: Column, wanted: str) -> str:
-        if wanted == "number":
-            return "Leave the column out of the mapping."
-        return (
-            "Times are numbers, or dates like 2024-03-01T12:00:00.25+01:00. A row without a time cannot be kept; check "
-            "column and unit, or write `clock: none`."
-        )
-
-
-@dataclass(frozen=True)
-class TextTable(Table):
-    """Unconverted cells of a text file or a sheet, in columns by place, and by name if the header has it only once."""
-
-    row: str = ":"
-    how: Tabular = field(kw_only=True)
-
-    @cached_property
-    def _no_sample(self) -> frozenset[str]:
-        return frozenset(text.strip() for text in self.how.no_sample)
-
-    def _column(self, column: Column) -> Sequence[str]:
-        name = self.columns[column] if isinstance(column, int) and column in self.values else None
+        name = self.columns[column] if self.how is not None and isinstance(column, int) else None
         if isinstance(name, str) and math.isfinite(self._number(name)):
             raise MappingError(
                 f"{self.shown}: its header row has the number {name!r} in column {column}: that looks like a row of "
                 "data, which `header: true` would drop.",
                 hint="Write `header: false`; and `skiprows: 1` if that row is not data.",
             )
-        return super()._column(column)
+        return self.values[column]
 
-    def _numbers(self, column: Column) -> FloatArray:
-        texts = self._column(column)
-        number = {text: self._number(text) for text in {*texts}}  # readings repeat: most columns hold few texts
-        return np.array([number[text] for text in texts])
+    def _plain(self, column: Column) -> Iterable[Any]:
+        values = self._column(column)
+        return values.tolist() if isinstance(values, np.ndarray) else values
 
-    def _stamps(self, column: Column) -> Iterable[str]:
-        return (text if ":" in text else self._as_python(text) for text in self._column(column))
+    @cached_property
+    def _no_sample(self) -> frozenset[str]:
+        return frozenset(text.strip() for text in self.how.no_sample) if self.how is not None else frozenset()
 
     def _as_python(self, cell: str) -> str:
         """Return a number as Python writes it; an empty text if its marks are not those of the table."""
-        decimal, thousands = self.how.decimal, self.how.thousands
+        decimal, thousands = (".", None) if self.how is None else (self.how.decimal, self.how.thousands)
         if decimal == "." and thousands is None:
             return cell
         whole, mark, rest = cell.partition(decimal)
@@ -174,8 +140,17 @@ class TextTable(Table):
         except ValueError:
             return math.inf
 
-    def _hint(self, row: int, column: Column, wanted: str) -> str:
-        """Return the next step for a cell that cannot be read, by its likely cause."""
+    def _refusal(self, row: int | np.integer[Any], column: Column, wanted: str) -> MappingError:
+        """Return the error for a cell that is not a number or time, as `wanted`, with the next step by its cause."""
+        text = f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}."
+        hint = "Leave the column out of the mapping." if wanted == "number" else (
+            "Times are numbers, or dates like 2024-03-01T12:00:00.25+01:00. A row without a time cannot be kept; check "
+            "column and unit, or write `clock: none`."
+        )  # fmt: skip
+        return MappingError(text, hint=hint if self.how is None else self._cause(int(row), column, wanted) or hint)
+
+    def _cause(self, row: int, column: Column, wanted: str) -> str:
+        """Return the next step for a text that cannot be read, by its likely cause; empty if none is likely."""
         cell = self._column(column)[row]
         columns = [self.values[place] for place in range(len(self.columns))]
         if cell in self.columns:
@@ -187,7 +162,7 @@ class TextTable(Table):
                 f"No cell of this row is a number (units?): write `skiprows: [{self.places[0] - 1}]` under "
                 "`read` (lines count from 0), with the lines left out already."
             )
-        marks = [mark for mark in _MARKS if mark in cell and mark != self.how.decimal]
+        marks = [mark for mark in _MARKS if mark in cell and (self.how is None or mark != self.how.decimal)]
         if marks and not cell.strip("+-0123456789eE" + _MARKS):
             mark = json.dumps(marks[0], ensure_ascii=False)
             return (
@@ -195,7 +170,7 @@ class TextTable(Table):
                 "separates groups of three digits."
             )
         if wanted == "time":
-            return super()._hint(row, column, wanted)
+            return ""
         words: dict[str, None] = {}
         for one in columns:  # a column of which most is no number holds names
             odd = [text for text in one if math.isinf(self._number(text))]
@@ -252,7 +227,7 @@ def _since_1970(date: re.Match[str], time: Time) -> int:
     return (when - _EPOCH) // timedelta(seconds=1) * 10**9 + int(f"{fraction or '':0<9}")
 
 
-def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
+def read_text(path: Path, shown: str, how: Csv | Text | Records) -> Table:
     """Read a table from a text file.
 
     Raises
@@ -288,7 +263,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
     return table_of(shown, _joined(cells, shown, how) if isinstance(how, Records) else cells, how)
 
 
-def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
+def table_of(shown: str, lines: list[Line], how: Tabular) -> Table:
     """Return the table made of lines of cells; the first line is the header if `how.header` is true."""
     header = tuple(cell.strip() for cell in lines.pop(0)[1]) if how.header and lines else ()
     if not lines:
@@ -316,7 +291,7 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     }
     places = [number for number, _ in lines]
     values = names | dict(enumerate(columns))
-    return TextTable(shown, header or tuple(range(wide)), places, values, how=how)
+    return Table(shown, header or tuple(range(wide)), places, values, ":", how)
 
 
 def skipped(place: int, how: Tabular) -> bool:
@@ -348,21 +323,18 @@ def _delimited(lines: Sequence[str], shown: str, how: Csv) -> Iterator[Line]:
 def _joined(lines: Sequence[Line], shown: str, how: Records) -> list[Line]:
     """Return one row for the lines of each record; raises MappingError for a line with a wrong number of cells."""
     per_row = len(how.numbers_per_line)
-    rows: list[Line] = []
     for place, (number, cells) in enumerate(lines):
-        line, wide = place % per_row, how.numbers_per_line[place % per_row]
+        wide = how.numbers_per_line[place % per_row]
         if len(cells) != wide:
             raise MappingError(
-                f"{shown}:{number}: {len(cells)} numbers on line {line + 1} of a record, where {wide} are expected.",
+                f"{shown}:{number}: {len(cells)} numbers on line {place % per_row + 1} of a record, where {wide} are "
+                "expected.",
                 hint="Repair the record, or correct `numbers_per_line`.",
             )
-        if line:
-            rows[-1][1].extend(cells)
-        else:
-            rows.append((number, cells))
     if len(lines) % per_row:
         raise MappingError(
             f"{shown}: the file ends after line {len(lines) % per_row} of a record of {per_row} lines.",
             hint="The file was cut short: get it again.",
         )
-    return rows
+    starts = range(0, len(lines), per_row)
+    return [(lines[at][0], [cell for _, cells in lines[at : at + per_row] for cell in cells]) for at in starts]

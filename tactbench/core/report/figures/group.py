@@ -5,14 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from operator import itemgetter
 from textwrap import fill
 from typing import TYPE_CHECKING, NamedTuple
 
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, error_of, grouped
+from tactbench.core.leaderboard.names import answer_name, error_of, grouped, hardware_name
 from tactbench.core.matrix.store import Row
-from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.published import stands_beside
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers
@@ -24,11 +22,6 @@ if TYPE_CHECKING:
 
 _LINE = 64
 """Largest number of characters of a line of a heading above a figure of one column."""
-MARKS = {
-    "simulated": "SIM: simulated, no hardware was touched.",
-    "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
-}
-"""Explanations of the marks in figures, by the key of a row that sets the mark."""
 
 
 class Sketch(NamedTuple):
@@ -42,17 +35,13 @@ class Sketch(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """The cell of one sensor in a figure, with its answers."""
+    """The cell of one sensor in a figure."""
 
+    sensor: str
     row: Row
     """Row of the replicate shown in the figure."""
     answers: Mapping[str, Answers]
     """Answers by role: train, validation, test."""
-
-    @property
-    def sensor(self) -> str:
-        """Name of the panel's sensor."""
-        return str(self.row["sensor"])
 
 
 @dataclass(frozen=True)
@@ -67,16 +56,6 @@ class Group:
     def row(self) -> Row:
         """Row of the first panel; task, protocol, split and estimator are the same in all panels."""
         return self.panels[0].row
-
-    @cached_property
-    def colours(self) -> dict[str, str]:
-        """Colour of each sensor by name, the same in all figures of the folder."""
-        return sensor_colours(self.results.rows)
-
-    @property
-    def metric(self) -> str:
-        """Name of the task's metric as in tables, such as RMSE."""
-        return METRIC_NAMES.get(self.task.metric, self.task.metric)
 
     @property
     def quantity(self) -> str:
@@ -101,16 +80,17 @@ class Group:
         words = [kind, row["task"], row["protocol"], row["split"], answer_name(row)]
         words += [] if row["simulated"] else [row["rig"]]
         name = re.sub(r"[^a-z0-9]+", "-", "-".join(filter(None, words)).lower()).strip("-")
-        # A figure of single answers shows one of several replicates.
-        shown = f"replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
-        heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
-        if row["split"] not in (None, "roles"):
-            heading.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
-        heading += ["SIM" if row["simulated"] else f"rig {row['rig']}", shown]
+        shown, stamps = "", [f"‡: {stamp}" for stamp in row["stamps"]]
+        if row["repeats"] > 1:  # a figure of single answers is of one replicate
+            shown = f"replicate with seed {row['seed']}"
+            stamps.append(f"Shown: {shown}; the tables are over all of them.")
+        if row["dagger"]:
+            stamps.append("†: each set, the test set too, is scaled by its own mean and deviation.")
+        split = "" if row["split"] in (None, "roles") else f"split {row['split']}{' ‡' * bool(row['stamps'])}"
+        protocol = row["protocol"] + " †" * row["dagger"]
+        heading = [row["task"], answer_name(row), protocol, split, hardware_name(row), shown]
         figure.suptitle(fill(" · ".join(filter(None, heading)), _LINE))
-        marks = [MARKS[key] for key in MARKS if row[key]] + [f"‡: {stamp}" for stamp in row["stamps"]]
-        marks += [f"Shown: {shown}; the tables are over all of them."] if shown else []
-        return Sketch(name, title, " ".join((caption, *marks)), figure)
+        return Sketch(name, title, " ".join((caption, *stamps)), figure)
 
 
 def with_unit(words: str, unit: str) -> str:
@@ -144,7 +124,7 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
         for row in answers[shown]:
             stored = results.answers(row)
             if "test" in stored:
-                panels.setdefault(row["sensor"], Panel(results.replicate(row), stored))
+                panels.setdefault(row["sensor"], Panel(row["sensor"], results.replicate(row), stored))
             else:
                 remark(f"{row['cell']} is not drawn: cells/{row['key']}.h5 cannot be read. Run the cell again.")
         if panels:

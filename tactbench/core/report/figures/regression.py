@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.report.figures.group import Group, Sketch, with_unit
-from tactbench.core.report.figures.style import BLACK, GREY, corner, panels
+from tactbench.core.report.figures.style import panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.task import VectorTarget
-from tactbench.core.tables.numbers import score_with_unit, suffix
+from tactbench.core.tables.numbers import score_with_unit
 
 
 def prediction_against_time(group: Group) -> Sketch:
@@ -26,34 +25,35 @@ def prediction_against_time(group: Group) -> Sketch:
     shown = [panel for panel in group.panels if "train" in panel.answers]
     if not shown:
         raise NotApplicable(f"split {group.row['split']!r} has one training set for each fold, not a common one")
-    figure, axes = panels(len(shown), 2, 1.35, sharey="row")
+    figure, axes = panels(len(shown), 2, sharey="row")
     for line, panel in zip(axes, shown, strict=True):
         for here, role in zip(line, ("train", "test"), strict=True):
             answers = panel.answers[role]
             time = end_to_end(answers)
             order = np.lexsort((time, answers.recording))
             breaks = np.flatnonzero(np.diff(answers.recording[order])) + 1  # a line breaks at each new recording
-            style = {"color": GREY, "markersize": 1.2, "markeredgewidth": 0, "rasterized": True}
-            here.plot(time[order], answers.y_true[order], ".", **style)
+            here.plot(time[order], answers.y_true[order], ".", color="grey", rasterized=True)
             predicted = answers.y_pred[order].astype(np.float64)
             across, upwards = (np.insert(values, breaks, np.nan) for values in (time[order], predicted))
-            here.plot(across, upwards, "-", color=group.colours[panel.sensor], linewidth=0.7)
-            here.set_title(f"{panel.sensor}, {'training' if role == 'train' else 'test'}")
-            value = panel.row["score"]
-            if role == "train":
-                value = metric_called(group.task.metric).of(answers.y_true, answers.y_pred)
-            corner(here, f"{group.metric} {score_with_unit(value, group.task.unit)}")
+            here.plot(across, upwards, "-", color="C0")
+            here.set_title(f"{panel.sensor}, {role}\n{_error(group, answers.y_true, answers.y_pred)}")
             # A recording without clock counts its rows.
             rows = np.array_equal(answers.time_s, answers.row)
             here.set_xlabel("row of the recording" if rows else "time [s]")
         line[0].set_ylabel(with_unit(group.quantity, group.task.unit))
     caption = (
-        f"Predicted {group.quantity} (line) and the reference's reading of it (grey dots) against time; left the "
-        f"training set, right the test set, in the corner the {group.metric} of the set. Recordings of one set stand "
-        "end to end; samples that the protocol discards are missing."
+        f"Predicted {group.quantity} (line) and the reference's reading of it (grey dots) against time. Recordings of "
+        "one set stand end to end; samples that the protocol discards are missing."
     )
     title = f"Does the answer follow the {group.quantity} in time?"
     return group.sketch("prediction-against-time", title, caption, figure)
+
+
+def _error(group: Group, true: FloatArray, predicted: FloatArray) -> str:
+    """Return the task's error of the answers in a panel as text; of a component of a vector, its RMSE."""
+    name = "rmse" if isinstance(group.task.target, VectorTarget) else group.task.metric
+    value = metric_called(name).of(true, predicted)
+    return f"{METRIC_NAMES.get(name, name)} {score_with_unit(value, group.task.unit)}"
 
 
 def end_to_end(answers: Answers) -> FloatArray:
@@ -69,44 +69,35 @@ def end_to_end(answers: Answers) -> FloatArray:
 
 def residuals(group: Group) -> Sketch:
     """Draw the test set's predictions against their targets, one panel for each sensor or component of its answers."""
-    shown = list(_components(group))
+    names = group.task.target.names if isinstance(group.task.target, VectorTarget) else ("",)
+    shown: list[tuple[str, FloatArray, FloatArray]] = [
+        (", ".join(filter(None, (panel.sensor, name))), _column(test.y_true, place), _column(test.y_pred, place))
+        for panel in group.panels
+        for test in [panel.answers["test"]]
+        for place, name in enumerate(names)
+    ]
     columns = min(2, len(shown))
-    figure, axes = panels(-(-len(shown) // columns), columns, 2.3, sharex=True, sharey=True)
-    unit = group.task.unit
-    every = np.concatenate([values for _, _, *both, _ in shown for values in both])
+    figure, axes = panels(-(-len(shown) // columns), columns, sharex=True, sharey=True)
+    every = np.concatenate([values for _, *both in shown for values in both])
     ends = [every.min(), every.max()]
-    for here, (sensor, title, true, predicted, text) in zip(axes.flat, shown, strict=False):
-        style = {"markersize": 1.6, "markeredgewidth": 0, "alpha": 0.5, "rasterized": True}
-        here.plot(true, predicted, ".", color=group.colours[sensor], **style)
-        here.plot(ends, ends, "-", color=BLACK, linewidth=1.0)
-        here.set_title(title)
+    for here, (title, true, predicted) in zip(axes.flat, shown, strict=False):
+        here.plot(true, predicted, ".", color="C0", rasterized=True)
+        here.plot(ends, ends, "-", color="black")
+        here.set_title(f"{title}\n{_error(group, true, predicted)}")
         here.set_aspect("equal")
-        here.locator_params(nbins=6, steps=[1, 2, 5, 10])
-        corner(here, text)
         here.tick_params(labelbottom=True)
-        here.set_xlabel(with_unit(f"target {group.quantity}", unit))
+        here.set_xlabel(with_unit(f"target {group.quantity}", group.task.unit))
     for here in axes.flat[len(shown) :]:
         here.set_visible(False)
     for here in axes[:, 0]:
-        here.set_ylabel(with_unit("predicted", unit))
-    bias = "; ".join(f"{title} {np.mean(predicted - true):+.3g}" for _, title, true, predicted, _ in shown)
+        here.set_ylabel(with_unit("predicted", group.task.unit))
     caption = (
-        f"Predicted against target {group.quantity}, one dot for each test row. Perfect predictions lie on the "
-        f"black line. Mean of prediction minus target: {bias}{suffix(unit)}."
+        f"Predicted against target {group.quantity} of the test set, one dot for each row. Perfect predictions lie on "
+        "the black line."
     )
     return group.sketch("residuals", f"How far off is the predicted {group.quantity}?", caption, figure)
 
 
-def _components(group: Group) -> Iterator[tuple[str, str, FloatArray, FloatArray, str]]:
-    """Yield (sensor, title, targets, predictions, text of the error) for each panel."""
-    target, unit = group.task.target, group.task.unit
-    for panel in group.panels:
-        true, predicted = panel.answers["test"].y_true, panel.answers["test"].y_pred
-        if not isinstance(target, VectorTarget):
-            text = f"{group.metric} {score_with_unit(panel.row['score'], unit)}"
-            yield panel.sensor, panel.sensor, true, predicted, text
-            continue
-        for place, name in enumerate(target.names):
-            own = true[:, place], predicted[:, place]
-            rmse = float(np.sqrt(np.mean((own[1] - own[0]) ** 2)))
-            yield panel.sensor, f"{panel.sensor}, {name}", *own, f"RMSE {score_with_unit(rmse, unit)}"
+def _column(values: FloatArray, place: int) -> FloatArray:
+    """Return a column of (n, components) values, or all of (n,) values."""
+    return values.reshape(len(values), -1)[:, place]

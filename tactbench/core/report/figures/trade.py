@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cost.knobs import TIMES
-from tactbench.core.cost.precision import SHARE, diagrams, precise
+from tactbench.core.cost.precision import SHARE, diagrams
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
 from tactbench.core.plugins.interfaces import CostPoint
-from tactbench.core.report.figures.style import BLACK, GREY, LINES, MARKERS, PAGE_IN, legend, panels, save, styled
+from tactbench.core.report.figures.style import MARKERS, legend, panels, save, styled
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
@@ -35,20 +35,19 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
     """
     shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
     times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
-    figure, axes = panels(1, len(times), 3.4, width_in=PAGE_IN, sharey=True)
+    figure, axes = panels(1, len(times), wide=True, sharey=True)
     for here, time in zip(axes[0], times, strict=True):
         own = [one for one in shown if TIMES[one["knob"]] == time]
         for knob, path in grouped(own, lambda one: str(one["knob"])).items():
             place = list(TIMES).index(knob)
-            across, upwards = [one[time] for one in path], [one["score"] for one in path]
-            ends = [[abs(one["score"] - (one["score"] if one[end] is None else one[end])) for one in path]
-                    for end in ("ci_low", "ci_high")]  # fmt: skip
-            here.errorbar(across, upwards, ends, fmt=" ", ecolor=LINES[place % len(LINES)], elinewidth=0.6)
-            _path(here, across, upwards, place, knob, [str(one["value"]) for one in path], joined=knob != "estimator")
+            points = [(one[time], one["score"], str(one["value"])) for one in path]
+            _draw_points(here, points, place, line="" if knob == "estimator" else "-", label=knob)
+            for one in path:
+                if one["ci_low"] is not None and one["ci_high"] is not None:
+                    here.vlines(one[time], one["ci_low"], one["ci_high"], color=f"C{place}")
         if known["trivial"] is not None:
-            here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
+            here.axhline(known["trivial"], color="grey", ls="--", label="best answer that looks at nothing")
         here.set(xlabel=ACROSS[time], xscale="log")
-        _plain_numbers(here.xaxis)
     axes[0][0].set_ylabel(f"{metric_name(known)}, {direction(known)}")
     figure.suptitle(visible(title_of(known)))
     legend(figure, axes.flat)
@@ -66,57 +65,29 @@ def title_of(known: Mapping[str, Any]) -> str:
 def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
     """Return the figure of a simulated rig: error against seconds per recording, one panel for each observable.
 
-    The grey line joins the points that no other point beats in both; the dashed line is a third of the observable's
-    noise.
+    The dashed line is a third of the observable's noise.
     """
     found = diagrams(points)
-    figure, axes = panels(-(-len(found) // 2), min(2, len(found)), 3.0, width_in=PAGE_IN)
-    for here in axes.flat[len(found) :]:
-        here.set_visible(False)
-    families = list(dict.fromkeys(map(_family, points)))
-    for here, ((subject, observable), group) in zip(axes.flat, found.items(), strict=False):
-        for family, own in grouped(group, _family).items():
-            across, upwards = [one.seconds for one in own], [_least(one) for one in own]
-            texts = ["default" if one.default else "" for one in own]
-            _path(here, across, upwards, families.index(family), family, texts, joined=False)
-        best = precise(group)
-        here.plot([one.seconds for one in best], [_least(one) for one in best], "-", color=GREY, lw=0.8, zorder=0)
+    figure, axes = panels(1, len(found), wide=True)
+    for here, ((subject, observable), group) in zip(axes[0], found.items(), strict=True):
+        _draw_points(here, [(one.seconds, one.error, one.label) for one in group], 0, line="")
         if math.isfinite(group[0].floor):
-            here.axhline(SHARE * group[0].floor, color=BLACK, ls="--", lw=0.8, label="a third of the noise")
+            here.axhline(SHARE * group[0].floor, color="black", ls="--", label="a third of the noise")
         here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
                  ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
-        _plain_numbers(here.xaxis)
-        _plain_numbers(here.yaxis)
     figure.suptitle(title)
     legend(figure, axes.flat)
     return figure
 
 
-def _plain_numbers(axis: Any) -> None:
-    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers of ten."""
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
-
-
-def _family(point: CostPoint) -> str:
-    return str(point.settings.get("family", ""))
-
-
-def _least(point: CostPoint) -> float:
-    """Return the error of a point, at least 1e-12 so that a logarithmic axis can show it."""
-    return max(point.error, 1e-12)
-
-
-def _path(
-    here: Axes, across: Sequence[float], upwards: Sequence[float], place: int, name: str, texts: Sequence[str], *,
-    joined: bool,
-) -> None:  # fmt: skip
-    """Draw points with one text each, joined by a line if `joined`."""
-    colour, mark = LINES[place % len(LINES)], MARKERS[place % len(MARKERS)]
-    here.plot(across, upwards, mark + "-" * joined, color=colour, markersize=4, linewidth=1.0, label=visible(name))
-    for text, x, y in zip(texts, across, upwards, strict=True):
-        beside = (3, -8 if place % 2 else 3)
-        here.annotate(visible(text), (x, y), beside, textcoords="offset points", color=colour, fontsize=5.5)
+def _draw_points(
+    here: Axes, points: Sequence[tuple[float, float, str]], place: int, *, line: str, label: str = ""
+) -> None:
+    """Draw points with a text beside each, joined by a line of the style `line`; `place` selects colour and marker."""
+    across, upwards, texts = zip(*points, strict=True)
+    here.plot(across, upwards, MARKERS[place] + line, color=f"C{place}", label=label)
+    for x, y, text in zip(across, upwards, texts, strict=True):
+        here.annotate(f" {visible(text)}", (x, y), color=f"C{place}")
 
 
 _COLUMNS = {

@@ -16,7 +16,7 @@ from typing import NamedTuple
 BITS_PER_BYTE = 10
 """Bits on the line for each byte: start bit, 8 data bits, stop bit (8N1) (sourced: the manual, page 13)."""
 LONGEST_LINE = 128
-"""Number of bytes after which a line without an end is discarded (assumed)."""
+"""Number of bytes kept of a line without an end (assumed): above the length of every readable line."""
 LONGEST_ANSWER = 34
 """Length of the longest answer in the sources [bytes]: the refusal of a drive that is too hot."""
 
@@ -26,18 +26,8 @@ INVALID_PARAMETER = "Invalid parameter"
 NOT_AVAILABLE = "Command not available"
 OVERTEMPERATURE = "Overtemperature - drive disabled"
 """Answer of a drive that is too hot. The manual typesets a dash; two public drivers match the hyphen (sourced)."""
-REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE)
-NOTICES = "pvrfhtwx"
-"""Notices: position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4, 5.
-
-Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
-ACKNOWLEDGED = frozenset(
-    ("EN", "DI", "LA", "LR", "M", "V", "HO", "NP", "NPOFF", "SP", "AC", "DEC", "LL", "APL", "LPC", "LCC", "CORRIDOR",
-     "ANSW", "SOR")
-)  # fmt: skip
-"""Commands that the drive answers by ``OK`` (sourced: the manual)."""
 TEXTS = ("VER", "GTYP", "GSER")
-"""Queries that the drive answers by a text; it answers all others by a number."""
+"""Queries that the drive answers by a text; it answers all others by a number, and commands by ``OK``."""
 
 
 class Command(NamedTuple):
@@ -53,7 +43,7 @@ def encode(name: str, argument: int | None = None) -> bytes:
     return f"{name}{'' if argument is None else argument}\r".encode("ascii")
 
 
-_COMMAND = re.compile(r"[0-9]{0,3}([A-Z]+)([+-]?[0-9]{1,19})?", re.ASCII)
+_COMMAND = re.compile(r"[0-9]{0,3}([A-Z]{1,20})([+-]?[0-9]{1,19})?", re.ASCII)
 """Pattern of a command. The address before the name, for lines with several drives, is ignored: there is one drive."""
 
 
@@ -65,29 +55,28 @@ class CommandReader:
 
     def feed(self, data: bytes) -> list[Command]:
         """Return the commands completed by `data`; a command that cannot be read has an empty name."""
-        found = []
         *lines, rest = (self._line + data).split(b"\r")
-        # One byte more than allowed is kept, so that the line cannot be read as a shorter one.
-        self._line = rest[: LONGEST_LINE + 1]
-        for line in lines:
-            match = _COMMAND.fullmatch(line.decode("latin-1").replace(" ", "").upper())
-            name, argument = ("", None) if match is None or len(line) > LONGEST_LINE else match.groups()
-            found.append(Command(name, int(argument) if argument else None))
-        return found
+        self._line = rest[:LONGEST_LINE]
+        matches = [_COMMAND.fullmatch(line.decode("latin-1").replace(" ", "").upper()) for line in lines]
+        return [Command(match[1], int(match[2]) if match[2] else None) if match else Command("") for match in matches]
 
 
 class Kind(Enum):
-    """Kinds of lines sent by the drive."""
+    """Kinds of lines sent by the drive, each with its pattern; a line is of the first kind whose pattern it matches."""
 
-    OK = "ok"
-    VALUE = "value"
+    OK = OK
+    VALUE = "[+-]?[0-9]{1,19}"
     """An integer, or a row of 0 and 1 as answer to GST or GFS."""
-    TEXT = "text"
+    REFUSAL = f"{UNKNOWN_COMMAND}|{INVALID_PARAMETER}|{NOT_AVAILABLE}|Overtemperature.+"
+    """The character between the words of `OVERTEMPERATURE` differs among sources; the meaning does not."""
+    NOTICE = "[pvrfhtwx]"
+    """Message sent without a command, never the answer to one: position reached, velocity reached, error (older
+    drives), fault, edge at the analog input, inputs 3, 4, 5.
+
+    Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
+    TEXT = r"[\x20-\x7e]{2,100}"
     """Any other printable text."""
-    REFUSAL = "refusal"
-    NOTICE = "notice"
-    """Message sent without a command; never the answer to a command."""
-    GARBLED = "garbled"
+    GARBLED = ""
     """Text that no drive sends: damaged on the line."""
 
 
@@ -99,40 +88,18 @@ class Line(NamedTuple):
     t_ns: int = 0
     """Time of receipt of the line's first byte [ns]."""
 
-    def answers(self, name: str) -> bool:
-        """Return True if the line may be the answer to a command; a refusal may answer any command.
+    def answers(self, query: str) -> bool:
+        """Return True if the line may be the answer to a query.
 
-        A late answer to an earlier command of the same kind passes, too, as answers do not name their command.
+        A late answer to an earlier query of the same kind passes, too, as answers do not name their query.
         """
-        if self.kind is Kind.REFUSAL:
-            return True
-        if name.upper() in ACKNOWLEDGED:
-            return self.kind is Kind.OK
-        return self.kind is Kind.VALUE or (self.kind is Kind.TEXT and name.upper() in TEXTS)
-
-
-_VALUE = re.compile(r"[+-]?[0-9]{1,19}")
-_PRINTED = re.compile(r"[\x20-\x7e]+")
+        return bool(query) and (self.kind is Kind.VALUE or (self.kind is Kind.TEXT and query in TEXTS))
 
 
 def _read_line(raw: bytes, t_ns: int) -> Line:
-    text, whole = raw.decode("latin-1").removesuffix("\r"), raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
-    if whole and raw.startswith(b"Overtemperature"):
-        # The character between the words differs among sources; the meaning does not.
-        return Line(Kind.REFUSAL, OVERTEMPERATURE, t_ns)
-    if not whole or _PRINTED.fullmatch(text) is None:
-        kind = Kind.GARBLED
-    elif text == OK:
-        kind = Kind.OK
-    elif text in REFUSALS:
-        kind = Kind.REFUSAL
-    elif _VALUE.fullmatch(text):
-        kind = Kind.VALUE
-    elif len(text) == 1:
-        kind = Kind.NOTICE if text in NOTICES else Kind.GARBLED
-    else:
-        kind = Kind.TEXT
-    return Line(kind, text, t_ns)
+    text, end = raw[:-1].decode("latin-1"), raw[-1:]
+    kinds = (kind for kind in Kind if end == b"\r" and re.fullmatch(kind.value, text))
+    return Line(next(kinds, Kind.GARBLED), text, t_ns)
 
 
 class LineReader:
@@ -144,15 +111,10 @@ class LineReader:
 
     def feed(self, data: bytes, t_ns: int = 0) -> list[Line]:
         """Return the lines completed by `data`, received at `t_ns`, including notices; raises no error."""
-        if not self._line:
-            self._began_ns = t_ns
+        began_ns = self._began_ns if self._line else t_ns
         *ended, rest = (self._line + data).split(b"\n")
-        found = [_read_line(raw, t_ns if number else self._began_ns) for number, raw in enumerate(ended)]
-        if ended:
-            self._began_ns = t_ns
-        # One byte more than allowed is kept, so that an overlong line is recognised.
-        self._line = rest[: LONGEST_LINE + 2]
-        return found
+        self._line, self._began_ns = rest[:LONGEST_LINE], t_ns if ended else began_ns
+        return [_read_line(raw, t_ns if number else began_ns) for number, raw in enumerate(ended)]
 
     def clear(self) -> None:
         """Discard an unfinished line, after a time-out or a change of the answer mode."""

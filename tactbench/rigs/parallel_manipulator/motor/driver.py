@@ -14,16 +14,11 @@ from tactbench.plugin.devices import (
     Positioner,
     PositionerError,
     PositionerFacts,
+    PositionerSilentError,
     PositionerState,
 )
-from tactbench.rigs.parallel_manipulator.motor.codec import (
-    ACKNOWLEDGED,
-    Configuration,
-    OperationStatus,
-    encode,
-    line_time_s,
-)
-from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange, MotorRefusalError
+from tactbench.rigs.parallel_manipulator.motor.codec import Configuration, Line, OperationStatus, encode, line_time_s
+from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 CORRIDOR_M = 0.2e-3
@@ -40,11 +35,10 @@ STANDING_NS = 20_000_000
 
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
-_WATCHED = ("POS", "GRC", "OST")
 _CHANGED = "Check if the drive was without power or set by another program, and the option against its manual."
 
-_Setting = tuple[str, int, str]
-"""Command, argument, and the query that reads the setting back."""
+_ENDS = ("GPL", "GNL")
+"""Queries of the ends of travel, which are set by homing."""
 
 
 def retreat_command(options: FaulhaberOptions) -> bytes:
@@ -61,8 +55,8 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 class FaulhaberDriver(Positioner):
     """Driver of a linear motor on a Faulhaber drive of the 300x RS generation.
 
-    While the motor moves, position and current are polled as fast as the line permits, 30 to 40 times a second at 9600
-    baud, 200 times at 115200; at rest 50 times. The time of a state is the receipt of the first byte of the
+    While the motor moves, position and status are polled as fast as the line permits, some 40 times a second at 9600
+    baud, 250 times at 115200; at rest 50 times. The time of a state is the receipt of the first byte of the
     position's answer; the drive has measured it a few bytes earlier. Every setting, limit and target is read back:
     the protocol has no checksum.
     """
@@ -73,11 +67,13 @@ class FaulhaberDriver(Positioner):
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
-        self._settings, self._limits = _required(self.options)
+        self._settings = _stated(self.options)
         self._exchange = Exchange(self.link, settings.clock, self.options.baud)
-        self._watching = self._confirming = self._acknowledged = False
-        self._turn = self._polled_ns = self._move_number = 0
-        self._latest: dict[str, Answer] = {}
+        self._watching = self._confirmed = self._earlier = False
+        """True while the motor is polled; once the drive has the target; if the next answer is of before the move."""
+        self._polled_ns = 0
+        self._position: Line | None = None
+        """Position whose status is queried next."""
         self._usual = 0
         """Usual speed of moves in the drive's units."""
         self._speed: int | None = None
@@ -92,7 +88,7 @@ class FaulhaberDriver(Positioner):
         RigError
             For a setting that the drive does not support.
         """
-        _required(options)
+        _stated(options)
         bytes_ahead = LONGEST_AHEAD + len(retreat_command(options))
         return replace(
             super().facts_of(options),
@@ -109,29 +105,23 @@ class FaulhaberDriver(Positioner):
         return +self._exchange.counts
 
     def identify(self) -> Mapping[str, str]:
-        """Return the drive's firmware, and its model and serial number if known."""
-        found = {"firmware": self._exchange.greet()}
-        for query, name in (("GTYP", "model"), ("GSER", "serial")):
-            with suppress(MotorRefusalError):
-                found[name] = self._ask(query).checked().text
-        return found
+        """Return the drive's firmware."""
+        return {"firmware": self._exchange.greet()}
 
     def start(self) -> None:
-        """Let the drive acknowledge commands, set and read back speeds and currents, and begin polling the motor."""
+        """Let the drive name refused commands, set and read back speeds and currents, and begin polling the motor."""
         if not self._exchange.version:
             self._exchange.greet()
         # No source states the answer to ANSW itself.
         self._exchange.send("ANSW", 2)
         self._exchange.quiet()
-        if not self._has(Configuration.ACKNOWLEDGES):
-            raise PositionerError("The motor's drive does not acknowledge commands after ANSW2.")
-        self._ask("SOR", 0)
-        self._settings, _ = _required(self.options)
-        if (limit_a := self.options.current_limit_a) is not None:
+        self._exchange.send("SOR", 0)
+        if "GPC" in self._settings:
             # The continuous current may not be above the peak; a lower one is the motor's own.
-            self._settings.append(("LCC", min(self.options.current(limit_a), self._sure("GCC")), "GCC"))
-        for setting in self._settings:
-            self._keep(*setting)
+            self._settings["GCC"] = ("LCC", min(self._settings["GPC"][1], self._sure("GCC")))
+        for query, setting in self._settings.items():
+            if query not in _ENDS:
+                self._keep(query, *setting)
         self._usual = self._speed = self._sure("GSP")
         self.enabled = self._has(Configuration.POWER_STAGE)
         if self.enabled:
@@ -147,7 +137,7 @@ class FaulhaberDriver(Positioner):
 
     def enable(self) -> None:
         """Give the motor power; it holds its place. If its target is elsewhere, power is switched off again."""
-        self._ask("EN")
+        self._exchange.send("EN")
         self.enabled = self._has(Configuration.POWER_STAGE)
         if not self.enabled:
             raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its power supply.")
@@ -162,8 +152,10 @@ class FaulhaberDriver(Positioner):
     def disable(self) -> None:
         """Switch the motor's power off; it can be pushed then, and falls unless something holds it."""
         self._forget()
-        self._ask("DI")
-        self.enabled = False
+        self._exchange.send("DI")
+        self.enabled = self._has(Configuration.POWER_STAGE)
+        if self.enabled:
+            raise PositionerError("The motor's drive was disabled and still has power.", hint="Cut its power supply.")
 
     def locate(self) -> tuple[float, float]:
         """Query target and position, each until two successive answers agree; return position and target [m]."""
@@ -177,9 +169,9 @@ class FaulhaberDriver(Positioner):
         A drive that was without supply has kept neither (assumed: its power stage is off until EN).
         """
         self.homed = (
-            bool(self._limits)
+            _ENDS[0] in self._settings
             and self._has(Configuration.POWER_STAGE | Configuration.POSITION_LIMITS)
-            and all(self._sure(query) == argument for _, argument, query in self._limits)
+            and all(self._sure(query) == self._settings[query][1] for query in _ENDS)
         )
         if self.homed:
             self.locate()
@@ -191,37 +183,37 @@ class FaulhaberDriver(Positioner):
         The motor runs against an end stop for a minute at most; homed ``here`` it does not move. The drive gets
         its usual current limits again once the origin is found.
         """
-        if self.moving or not self._limits:
+        if self.moving or _ENDS[0] not in self._settings:
             raise NotReadyError(
-                f"The motor {'is moving' if self.moving else 'has no ends of travel'}.",
+                "The motor is moving, or has no ends of travel.",
                 hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
             )
         options, self.homed = self.options, False
         home = options.increments(options.home_m)
-        self._ask("APL", 0)
+        self._exchange.send("APL", 0)
         if options.homing == "end-stop":
             self.enable()
             self._against_stop(stop)
-        self._ask("HO", home)
+        self._exchange.send("HO", home)
         place_m, _ = self.locate()
         if abs(place_m - options.home_m) > CORRIDOR_M:
             raise PositionerError(f"The motor reports {place_m:g} m after homing to {options.home_m:g} m.")
-        for setting in self._limits:
-            self._keep(*setting)
-        self._ask("APL", 1)
+        for query in _ENDS:
+            self._keep(query, *self._settings[query])
+        self._exchange.send("APL", 1)
         self._check_limits()
         self.homed = True
         if self.enabled:
             # Position control again, from a target that is known, within the ends of travel.
-            (_, upper, _), (_, lower, _) = self._limits
+            upper, lower = (self._settings[query][1] for query in _ENDS)
             self._go(min(max(home, lower), upper), self._usual)
             self.finish(stop)
 
     def confirm(self) -> None:
         """Read back all settings and ends of travel of the options; raises PositionerError if a value differs."""
-        for setting in (*self._settings, *self._limits):
+        for query, setting in self._settings.items():
             # The speed of the last retreat may still be set.
-            (self._keep if setting[0] == "SP" else self._same)(*setting)
+            (self._keep if query == "GSP" else self._same)(query, *setting)
         self._speed = None
         self._check_limits()
 
@@ -232,15 +224,15 @@ class FaulhaberDriver(Positioner):
     def _against_stop(self, stop: Callable[[], bool]) -> None:
         """Run at the homing speed and current until the motor stands at its current limit in two successive polls."""
         little = self.options.current(self.options.homing_current_a)
-        before = [("LPC", self._sure("GPC"), "GPC"), ("LCC", self._sure("GCC"), "GCC")]
-        for command, argument, query in before:
-            self._keep(command, min(little, argument), query)
+        before = {"GPC": ("LPC", self._sure("GPC")), "GCC": ("LCC", self._sure("GCC"))}
+        for query, (command, argument) in before.items():
+            self._keep(query, command, min(little, argument))
         until_ns, times = self.clock() + round(1e9 * HOMING_S), 0
         try:
-            self._ask("V", self.options.speed(self.options.homing_speed_m_s))
+            self._exchange.send("V", self.options.speed(self.options.homing_speed_m_s))
             while times < 2:
-                status = OperationStatus(self._ask("OST").value)
-                limited = bool(status & OperationStatus.CURRENT_LIMITATION) and self._ask("GN").value == 0
+                status = OperationStatus(int(self._exchange.ask("OST").text))
+                limited = OperationStatus.CURRENT_LIMITATION in status and self._exchange.ask("GN").text == "0"
                 times = times + 1 if limited else 0
                 for ended, why in (
                     (status & _FAULTS, "the drive reports a fault"),
@@ -253,17 +245,19 @@ class FaulhaberDriver(Positioner):
                             hint="Check homing_speed_m_s and homing_current_a in the rig file.",
                         )
         finally:
-            self._ask("V", 0)
-        for setting in before:
-            self._keep(*setting)
+            self._exchange.send("V", 0)
+        for query, setting in before.items():
+            self._keep(query, *setting)
 
     # Motion -----------------------------------------------------------------------------------------------------------
 
     def move_to(self, position: float, speed: float | None = None) -> float:
         """Begin a move to the increment nearest to a position; the speed is rounded down."""
         self.check_move(position)
-        units = self._usual if speed is None else self.options.speed(speed)
-        return self._go(self.options.increments(position), units)
+        return self._go(self.options.increments(position), self._units(speed))
+
+    def _units(self, speed: float | None) -> int:
+        return self._usual if speed is None else self.options.speed(speed)
 
     def halt(self) -> None:
         """Begin a move to the position read last, whatever is under way: the motor brakes and holds there.
@@ -284,28 +278,24 @@ class FaulhaberDriver(Positioner):
         if math.isnan(self.facts.retreat) or not self.homed:
             self.halt()
             return
-        self._speed, speed = None, self.options.retreat_speed_m_s
-        units = self._usual if speed is None else self.options.speed(speed)
-        self._go(self.options.increments(self.facts.retreat), units)
+        self._speed = None
+        self._go(self.options.increments(self.facts.retreat), self._units(self.options.retreat_speed_m_s))
 
     def _go(self, target: int, speed: int) -> float:
-        """Send a move at once, without waiting for outstanding answers; return its target [m]."""
+        """Send a move at once, without waiting for an outstanding answer; return its target [m]."""
         target_m = self.options.position_m(target)
         self.begin(target_m, max(1, speed) * self.options.speed_unit_m_s)
-        self._move_number += 1
-        self._acknowledged = self._confirming = False
+        self._confirmed, self._earlier, self._position = False, not self._exchange.ready, None
         if speed != self._speed:
             self._speed = speed
-            self._exchange.send("SP", speed, self._move_number)
-        self._exchange.send("LA", target, self._move_number)
-        self._exchange.send("M", None, self._move_number)
+            self._exchange.send("SP", speed)
+        self._exchange.send("LA", target)
+        self._exchange.send("M")
         return target_m
 
     def _forget(self) -> None:
         """Treat target and speed as unknown: the last command may or may not have been carried out."""
-        self._moving = self._confirming = False
-        self._goal, self._speed = math.nan, None
-        self._move_number += 1
+        self._moving, self._goal, self._speed = False, math.nan, None
         self.state = self.state and replace(self.state, target=math.nan)
 
     def rescue(self, within_s: float | None) -> float:
@@ -323,24 +313,13 @@ class FaulhaberDriver(Positioner):
         self._watching = True
         return super().rescue(within_s)
 
-    # Commands that are waited for -------------------------------------------------------------------------------------
-
-    def _ask(self, name: str, argument: int | None = None) -> Answer:
-        """Send a command and return its answer; a query without an answer is sent again."""
-        while True:
-            while not self._exchange.ready:
-                for answer in self._exchange.pump(self._exchange.answer_s):
-                    self._take(answer)
-            answer = self._exchange.ask(name, argument)
-            if answer.line is not None or name in ACKNOWLEDGED:
-                answer.checked()
-                return answer
+    # Settings ---------------------------------------------------------------------------------------------------------
 
     def _sure(self, query: str) -> int:
         """Return the number on which two successive answers agree: the protocol has no checksum."""
-        before = None
+        self._position = before = None
         for _ in range(TRIES):
-            value = self._ask(query).value
+            value = int(self._exchange.ask(query).text)
             if value == before:
                 return value
             before = value
@@ -349,14 +328,14 @@ class FaulhaberDriver(Positioner):
     def _has(self, bits: Configuration) -> bool:
         return self._sure("CST") & bits == bits
 
-    def _keep(self, command: str, argument: int, query: str) -> None:
+    def _keep(self, query: str, command: str, argument: int) -> None:
         """Set a number and read it back; repeat this once if a digit was damaged on the line."""
-        self._ask(command, argument)
+        self._exchange.send(command, argument)
         if self._sure(query) != argument:
-            self._ask(command, argument)
-            self._same(command, argument, query)
+            self._exchange.send(command, argument)
+            self._same(query, command, argument)
 
-    def _same(self, command: str, argument: int, query: str) -> None:
+    def _same(self, query: str, command: str, argument: int) -> None:
         if (found := self._sure(query)) != argument:
             raise PositionerError(f"The drive has {query} {found} after {command}{argument} was set.", hint=_CHANGED)
 
@@ -368,7 +347,7 @@ class FaulhaberDriver(Positioner):
         if self._exchange.ready and self._watching:  # it stands: until the next poll
             timeout_s = min(timeout_s, max(0.0, 1e-9 * (self._polled_ns + STANDING_NS - self.clock())))
         try:
-            for answer in self._exchange.pump(timeout_s):
+            if answer := self._exchange.pump(timeout_s):
                 self._take(answer)
         except PositionerError:
             self._forget()
@@ -378,61 +357,64 @@ class FaulhaberDriver(Positioner):
     def _poll(self) -> None:
         if not self._exchange.ready:
             return
-        if self._confirming:
-            self._exchange.send("TPOS")
-        elif self._watching and (self._turn or self.moving or self.clock() >= self._polled_ns + STANDING_NS):
-            if self._turn == 0:
-                self._polled_ns = self.clock()
-            self._exchange.send(_WATCHED[self._turn])
+        if self.moving and not self._confirmed:
+            self._exchange.query("TPOS")
+        elif self._watching and self._position is not None:
+            self._exchange.query("OST")
+        elif self._watching and (self.moving or self.clock() >= self._polled_ns + STANDING_NS):
+            self._polled_ns = self.clock()
+            self._exchange.query("POS")
 
     def _take(self, answer: Answer) -> None:
         """Process an answer that no caller waits for; raises an error if it is wrong."""
-        if answer.name in _WATCHED:
-            # The three belong together: after a lost answer they are queried again from the first.
-            self._turn = 0 if answer.line is None else (self._turn + 1) % len(_WATCHED)
-            self._latest[answer.name] = answer
-            if self._turn == 0 and answer.line is not None:
-                self._note_status()
-        elif answer.name == "TPOS" and answer.line is not None and self._confirming:
-            self._confirming = False
-            if answer.value != self.options.increments(self._goal):
+        line, earlier, self._earlier = answer.line, self._earlier, False
+        position, self._position = self._position, None
+        if line is None and self.moving and not self._confirmed:
+            raise PositionerSilentError(
+                "The motor's drive did not answer after a move was sent; it may have carried it out.",
+                hint="Check the cable; read the position before the next move.",
+            )
+        if earlier or line is None:
+            return
+        if answer.query == "TPOS":
+            if int(line.text) != self.options.increments(self._goal):
                 raise PositionerError(
-                    f"The drive has the target {self.options.position_m(answer.value):g} m, not {self._goal:g} m.",
+                    f"The drive has the target {self.options.position_m(int(line.text)):g} m, not {self._goal:g} m.",
                     hint="A byte was damaged on the line: let the motor retreat, and check the cable.",
                 )
-        elif answer.of == self._move_number:
-            answer.checked()
-            if answer.name == "M":
-                self._acknowledged = self._confirming = True
+            self._confirmed = True
+        elif answer.query == "POS":
+            self._position = line
+        elif position is not None:
+            self._note_status(position, OperationStatus(int(line.text)))
 
-    def _note_status(self) -> None:
-        """Store position, current and status; a move has ended if the drive reports so after acknowledging it."""
-        position, current, status_ = (self._latest[name] for name in _WATCHED)
-        status = OperationStatus(status_.value)
+    def _note_status(self, position: Line, status: OperationStatus) -> None:
+        """Store position and status; a move has ended if the drive reports so and has its target."""
         problem = ", ".join(str(bit.name).lower().replace("_", " ") for bit in status & _PROBLEMS)
         if status & _FAULTS or self._exchange.fault:
             self.enabled = self._exchange.fault = False
             problem = problem or "a fault"
         self.see(
-            position.checked().t_ns,
-            self.options.position_m(position.value),
-            idle=self._acknowledged and bool(status & OperationStatus.POSITION_ATTAINED),
+            position.t_ns,
+            self.options.position_m(int(position.text)),
+            idle=self._confirmed and OperationStatus.POSITION_ATTAINED in status,
             target=self._goal,
-            current_a=current.value * self.options.current_unit_a,
             problem=problem,
         )
 
 
-def _required(options: FaulhaberOptions) -> tuple[list[_Setting], list[_Setting]]:
-    """Return settings and ends of travel as stated by the options; raises RigError if the drive lacks such a value."""
-    stated = (
-        ("SP", options.speed, options.speed_m_s, "GSP"),
-        ("AC", options.acceleration, options.acceleration_m_s2, "GAC"),
-        ("DEC", options.acceleration, options.acceleration_m_s2, "GDEC"),
-        ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m, "GCORRIDOR"),
-        ("LPC", options.current, options.current_limit_a, "GPC"),
-        ("LL", options.increments, options.upper_m, "GPL"),
-        ("LL", options.increments, options.lower_m, "GNL"),
-    )
-    found = [(command, of(value), query) for command, of, value, query in stated if value is not None]
-    return [one for one in found if one[0] != "LL"], [one for one in found if one[0] == "LL"]
+def _stated(options: FaulhaberOptions) -> dict[str, tuple[str, int]]:
+    """Return the stated settings by the query that reads each back: command and argument.
+
+    Raises RigError if the drive lacks such a value.
+    """
+    stated = {
+        "GSP": ("SP", options.speed, options.speed_m_s),
+        "GAC": ("AC", options.acceleration, options.acceleration_m_s2),
+        "GDEC": ("DEC", options.acceleration, options.acceleration_m_s2),
+        "GCORRIDOR": ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m),
+        "GPC": ("LPC", options.current, options.current_limit_a),
+        "GPL": ("LL", options.increments, options.upper_m),
+        "GNL": ("LL", options.increments, options.lower_m),
+    }
+    return {query: (command, of(value)) for query, (command, of, value) in stated.items() if value is not None}

@@ -1,8 +1,8 @@
-"""Exchange of commands and answers with the drive: assigned in order, with timeouts, and separated from notices.
+"""Commands to the drive, queries and their answers: one query at a time, with timeouts, separated from notices.
 
 Answers name no command and have no checksum; the drive answers in the order of commands (sourced as in ``codec.py``).
-So after a lost answer no line is assigned until the drive has answered a query whose answer is known: lines before that
-are late.
+So after a lost answer no line is taken for another answer until the drive has answered a query whose answer is known:
+lines before that are late. What a command has done is seen from a later query; its ``OK`` is not waited for.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ IN_A_ROW = 3
 """Number of successive lost answers after which the drive counts as silent (assumed)."""
 HOST_S = 0.15
 """Time added to that of the line [s]: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by
-some 60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
+some 60 ms (measured)."""
 
 
 class MotorRefusalError(PositionerError):
@@ -28,38 +28,15 @@ class MotorRefusalError(PositionerError):
 
 
 class Answer(NamedTuple):
-    """Outcome of a command: the answer, or its absence."""
+    """Outcome of a query."""
 
-    name: str
-    argument: int | None
-    of: int | None
-    """Number that was given to `send` with the command."""
-    line: Line | None = None
+    query: str
+    line: Line | None
     """Line of the answer; None: no answer came in time."""
-
-    @property
-    def value(self) -> int:
-        """The answer's integer; raises the errors of :meth:`checked`."""
-        return int(self.checked().text)
-
-    def checked(self) -> Line:
-        """Return the line; raises PositionerSilentError if no answer came, MotorRefusalError if the drive refuses."""
-        text = f"{self.name}{'' if self.argument is None else self.argument}"
-        if self.line is None:
-            raise PositionerSilentError(
-                f"The motor's drive did not answer {text} in time; it may have carried it out.",
-                hint="Check the cable; read the position before the next move.",
-            )
-        if self.line.kind is Kind.REFUSAL:
-            raise MotorRefusalError(
-                f"The motor's drive refuses {text}: {self.line.text}.",
-                hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
-            )
-        return self.line
 
 
 class Exchange:
-    """Exchange that sends commands and assigns the received lines to them.
+    """Exchange that sends commands and queries, and finds the answers among the received lines.
 
     Parameters
     ----------
@@ -77,7 +54,7 @@ class Exchange:
     fault
         True if the drive has sent notice of a fault since this attribute was last reset.
     counts
-        Event counts: ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
+        Event counts: ``time_outs``, ``garbled`` and ``unexpected`` lines, ``refusals``.
     """
 
     def __init__(self, link: ByteLink, clock: Clock, baud: int) -> None:
@@ -87,27 +64,34 @@ class Exchange:
         self.counts: Counter[str] = Counter()
         self._link, self._clock = link, clock
         self._reader = LineReader()
-        self._out: deque[Answer] = deque()
+        self._lines: deque[Line] = deque()
+        self._query = self._command = ""
         self._since_ns = self._missed = 0
         self._marking = False
 
     @property
     def ready(self) -> bool:
         """True if no answer is outstanding."""
-        return not self._out and not self._marking
+        return not self._query
 
-    def send(self, name: str, argument: int | None = None, of: int | None = None) -> None:
-        """Send a command now, even if answers are outstanding: the drive keeps the order. The answer carries `of`."""
-        if not self._out:
-            self._since_ns = self._clock()
-        self._link.write(encode(name, argument))
-        self._out.append(Answer(name, argument, of))
+    def send(self, name: str, argument: int | None = None) -> None:
+        """Send a command now, even if an answer is outstanding: the drive keeps the order."""
+        command = encode(name, argument)
+        self._link.write(command)
+        self._command = command.decode().strip()
 
-    def pump(self, timeout_s: float) -> list[Answer]:
-        """Read lines, waiting at most `timeout_s` for the first byte; return the outcomes of commands.
+    def query(self, name: str) -> None:
+        """Send a query; only while no answer is outstanding."""
+        self._query, self._since_ns = name, self._clock()
+        self._link.write(encode(name))
+
+    def pump(self, timeout_s: float) -> Answer | None:
+        """Read lines, waiting at most `timeout_s` for the first byte; return the outcome of the query, if known.
 
         Raises
         ------
+        MotorRefusalError
+            If the drive refuses a command.
         PositionerSilentError
             If three successive answers were lost.
         LinkUnplugged
@@ -115,40 +99,40 @@ class Exchange:
         """
         due_ns = self._since_ns + round(1e9 * self.answer_s * (3 if self._marking else 1))
         wait_s = timeout_s if self.ready else min(timeout_s, max(0.0, (due_ns - self._clock()) * 1e-9))
-        found: list[Answer] = []
         with suppress(LinkTimeout):
             received = self._link.read(wait_s)
-            for line in self._reader.feed(received.data, received.t_ns):
-                found += self._assigned(line)
-        return found if found or self.ready or self._clock() < due_ns else self._overdue()
+            self._lines += self._reader.feed(received.data, received.t_ns)
+        while self._lines:
+            if self._ends(line := self._lines.popleft()):
+                query, self._query = self._query, ""
+                return Answer(query, line)
+        return None if self.ready or self._clock() < due_ns else self._overdue()
 
-    def ask(self, name: str, argument: int | None = None) -> Answer:
-        """Send a command while no answer is outstanding, and return its outcome; raises the errors of :meth:`pump`."""
-        self.send(name, argument)
-        found: list[Answer] = []
-        while not found:
-            found = self.pump(self.answer_s)
-        return found[0]
+    def ask(self, name: str) -> Line:
+        """Return the answer to a query, sent again after a lost answer; raises the errors of :meth:`pump`."""
+        while True:
+            if self.ready:
+                self.query(name)
+            answer = self.pump(self.answer_s)
+            if answer is not None and answer.query == name and answer.line is not None:
+                return answer.line
 
     def greet(self) -> str:
-        """Find the drive: end a partial command on its line, and read its version until two answers agree.
+        """Find the drive: end a partial command on its line, and read its version twice.
 
         Raises
         ------
         LinkTimeout
-            If the drive does not answer.
+            If the drive does not answer, or not twice the same.
         """
         self._link.write(b"\r")
         self.quiet()
-        self.version, before = "", ""
-        for _ in range(5):
-            line = self.ask(MARK).line
-            if line is None:
-                self.quiet()
-            elif line.text == before and line.kind is not Kind.REFUSAL:
-                self.version = before
-                return before
-            before = "" if line is None else line.text
+        self.version = ""
+        with suppress(PositionerSilentError):
+            first, second = self.ask(MARK), self.ask(MARK)
+            if first.text == second.text:
+                self.version = first.text
+                return first.text
         raise LinkTimeout(
             f"No drive on {self._link.address} gives the same answer to {MARK} twice.",
             hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "
@@ -162,32 +146,37 @@ class Exchange:
             while self._clock() < deadline:
                 self._link.read(self.answer_s)
         self._reader.clear()
-        self._out.clear()
-        self._marking, self._missed = False, 0
+        self._lines.clear()
+        self._query, self._marking, self._missed = "", False, 0
 
-    def _assigned(self, line: Line) -> list[Answer]:
-        if line.kind is Kind.NOTICE:
-            self.fault |= line.text in "fr"
-        elif line.kind is Kind.GARBLED:
-            self.counts["garbled"] += 1
-        elif self._marking:
-            self._marking = line.text != self.version
-            self.counts["late"] += self._marking
-            self._since_ns = self._since_ns if self._marking else self._clock()
-        elif self._out and line.answers(self._out[0].name):
-            self.counts["refusals"] += line.kind is Kind.REFUSAL
-            self._missed, self._since_ns = 0, self._clock()
-            return [self._out.popleft()._replace(line=line)]
-        else:
-            self.counts["unexpected"] += 1
-        return []
+    def _ends(self, line: Line) -> bool:
+        """Return True if a line is the answer to the query."""
+        match line.kind:
+            case Kind.NOTICE:
+                self.fault |= line.text in "fr"
+            case Kind.GARBLED:
+                self.counts["garbled"] += 1
+            case Kind.REFUSAL:
+                self.counts["refusals"] += 1
+                raise MotorRefusalError(
+                    f"The motor's drive refuses {self._command}, or a command before: {line.text}.",
+                    hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
+                )
+            case Kind.VALUE | Kind.TEXT if self._marking and line.text == self.version:
+                self._marking, self._query = False, ""
+            case Kind.VALUE | Kind.TEXT if not self._marking and line.answers(self._query):
+                self._missed = 0
+                return True
+            case Kind.VALUE | Kind.TEXT:
+                self.counts["unexpected"] += 1
+        return False
 
-    def _overdue(self) -> list[Answer]:
-        """Give up all outstanding answers, and send the query `MARK`; raises PositionerSilentError after too many."""
-        lost = list(self._out)
-        self._out.clear()
+    def _overdue(self) -> Answer | None:
+        """Give up the outstanding answer, and send the query `MARK`; raises PositionerSilentError after too many."""
+        lost = None if self._marking else Answer(self._query, None)
         self._reader.clear()
-        self.counts["time_outs"] += len(lost)
+        self._query = ""
+        self.counts["time_outs"] += 1
         self._missed += 1
         if self._missed >= IN_A_ROW:
             self._missed, self._marking = 0, False
@@ -197,6 +186,6 @@ class Exchange:
                 hint="Check its power and cable. A moving motor completes its last move and holds.",
             )
         if self.version:
-            self._marking, self._since_ns = True, self._clock()
-            self._link.write(encode(MARK))
+            self._marking = True
+            self.query(MARK)
         return lost

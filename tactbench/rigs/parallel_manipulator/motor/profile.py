@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tactbench.plugin import RigError
 from tactbench.plugin.devices import PositionerOptions
@@ -31,7 +31,7 @@ class FaulhaberOptions(PositionerOptions):
     acceleration_unit_m_s2: float = Field(default=1e-3, gt=0.0)
     """Value of one unit of AC and DEC [m/s^2] (assumed likewise)."""
     current_unit_a: float = Field(default=1e-3, gt=0.0)
-    """Value of one unit of LPC, LCC, GRC [A] (sourced: Faulhaber manual MCBL 3564K024B CS, the rotary drive)."""
+    """Value of one unit of LPC, LCC [A] (sourced: Faulhaber manual MCBL 3564K024B CS, the rotary drive)."""
     lower_m: float | None = Field(default=None, lt=0.0)
     """Ends of travel [m]; the drive needs a negative and a positive end."""
     upper_m: float | None = Field(default=None, gt=0.0)
@@ -46,31 +46,33 @@ class FaulhaberOptions(PositionerOptions):
     homing_current_a: float = Field(default=0.2, gt=0.0)
     """Limit of current while running against an end stop [A]."""
 
+    @model_validator(mode="after")
+    def _sendable(self) -> Self:
+        if self.peak_force_n is not None and self.force_constant_n_a is None:
+            raise ValueError("peak_force_n needs force_constant_n_a: the drive takes a limit of current")
+        return self
+
     @property
     def current_limit_a(self) -> float | None:
         """Current limit that is sent to the drive [A]: `peak_current_a`, or the current at `peak_force_n` if lower.
 
-        None: neither option is stated, or `peak_force_n` without `force_constant_n_a`.
+        None: neither option is stated.
         """
-        force_n, constant = self.peak_force_n, self.force_constant_n_a
-        of_force = force_n / constant if force_n is not None and constant is not None else None
-        return min((one for one in (self.peak_current_a, of_force) if one is not None), default=None)
+        limits_a = [] if self.peak_current_a is None else [self.peak_current_a]
+        if self.peak_force_n is not None and self.force_constant_n_a is not None:
+            limits_a.append(self.peak_force_n / self.force_constant_n_a)
+        return min(limits_a, default=None)
 
     @property
     def largest_force_n(self) -> float | None:
-        """Largest force [N]: current limit times force constant, or `peak_force_n` if one of both is not stated."""
-        limit = self.current_limit_a
-        return (
-            self.peak_force_n if limit is None or self.force_constant_n_a is None else limit * self.force_constant_n_a
-        )
+        """Largest force [N]: current limit times force constant; None if one of both is not stated."""
+        limit_a, constant = self.current_limit_a, self.force_constant_n_a
+        return None if limit_a is None or constant is None else limit_a * constant
 
     @property
     def force_source(self) -> str:
         """Source of :attr:`largest_force_n`, for the tables of `doctor`."""
-        if self.current_limit_a is None or self.largest_force_n is None:
-            return super().force_source
-        sent = f"sent current limit, {self.current_limit_a:g} A"
-        return sent if self.force_constant_n_a else f"declared, with {sent}"
+        return f"sent current limit, {self.current_limit_a:g} A" if self.largest_force_n else super().force_source
 
     def homes_towards(self) -> int:
         """Return the sign of the homing speed towards an end stop; 0: homing without motion."""
@@ -88,26 +90,23 @@ class FaulhaberOptions(PositionerOptions):
 
     def speed(self, speed_m_s: float) -> int:
         """Return the argument of SP or V for a speed [m/s], rounded towards 0; it keeps the sign."""
-        return _whole(speed_m_s, self.speed_unit_m_s, LARGEST_SPEED, "speed", _down)
+        return _whole(speed_m_s, self.speed_unit_m_s, LARGEST_SPEED, "speed")
 
     def acceleration(self, acceleration_m_s2: float) -> int:
         """Return the argument of AC or DEC for an acceleration [m/s^2], rounded down."""
-        return _whole(acceleration_m_s2, self.acceleration_unit_m_s2, LARGEST_ACCELERATION, "acceleration", _down)
+        return _whole(acceleration_m_s2, self.acceleration_unit_m_s2, LARGEST_ACCELERATION, "acceleration")
 
     def current(self, current_a: float) -> int:
         """Return the argument of LPC or LCC for a current [A], rounded down."""
-        return _whole(current_a, self.current_unit_a, LARGEST_CURRENT, "current", _down)
+        return _whole(current_a, self.current_unit_a, LARGEST_CURRENT, "current")
 
 
-def _down(steps: float) -> int:
+def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable[[float], int] | None = None) -> int:
+    """Return a value in units of the drive, rounded down by default: then no value but 0 may become 0."""
+    steps = value / unit if math.isfinite(value) else largest + 1
     # A quotient that is an integer but for rounding is that integer, not the one below.
-    return int(steps * (1.0 + 4e-16))
-
-
-def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable[[float], int]) -> int:
-    """Return a value in units of the drive; except for positions, a value other than 0 must not be rounded to 0."""
-    steps = rounded(value / unit) if math.isfinite(value) else largest + 1
-    if abs(steps) > largest or (steps == 0 != value and rounded is _down):
+    steps = int(steps * (1.0 + 4e-16)) if rounded is None else rounded(steps)
+    if abs(steps) > largest or (steps == 0 != value and rounded is None):
         raise RigError(
             f"The drive has no {what} of {value:g}: its unit is {unit:g}, its largest number {largest}.",
             hint="Check this value and the drive's units in the rig file.",

@@ -6,8 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FoamPad, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import Medium, Spectrum
 from tactbench.rigs.twin.geometry import skin_grid
 
 CUT_OVER = 0.97
@@ -54,20 +53,15 @@ class Foam:
         return pressure, energy
 
 
-def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a pad from `low` to `high`: outer edges of the sheet's cells with their centres inside.
+def _covered(centres: FloatArray, own: FloatArray, low: float, high: float) -> FloatArray:
+    """Return the (n,) shares, 0 to 1, of cells with (n,) `centres` that lie within a pad from `low` to `high`.
 
-    The ends are the same on every grid, so that finer grids converge to the pad of the solver's reference figures.
+    The pad ends at the outer edges of the sheet's `own` cells with their centres inside: the same on every grid, so
+    that finer grids converge to the pad of the solver's reference figures.
     """
-    half = float(own[1] - own[0]) / 2
+    step, half = float(centres[1] - centres[0]), float(own[1] - own[0]) / 2
     inside = own[(own >= low) & (own <= high)]
-    return float(inside[0]) - half, float(inside[-1]) + half
-
-
-def _covered(centres: FloatArray, low: float, high: float) -> FloatArray:
-    """Return the (n,) shares, 0 to 1, of cells with (n,) `centres` that lie between `low` and `high`."""
-    step = float(centres[1] - centres[0])
-    ends = np.minimum(centres + step / 2, high) - np.maximum(centres - step / 2, low)
+    ends = np.minimum(centres + step / 2, inside[-1] + half) - np.maximum(centres - step / 2, inside[0] - half)
     return np.asarray(np.clip(ends / step, 0.0, 1.0))
 
 
@@ -84,8 +78,8 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
     if skin.sheet.pad is not None:
         low, high, arc = (edge.to("mm") for edge in skin.sheet.pad)
         own = skin_grid(skin.sheet)
-        along = _covered(grid.x_mm, *_edges(own.x_mm, low, high))
-        across = _covered(grid.s_mm, *_edges(own.s_mm, -arc / 2, arc / 2))
+        along = _covered(grid.x_mm, own.x_mm, low, high)
+        across = _covered(grid.s_mm, own.s_mm, -arc / 2, arc / 2)
         inside = along[:, None] * across[None, :]
         weight = OUTSIDE_THE_PAD + (1.0 - OUTSIDE_THE_PAD) * inside
     return Medium(

@@ -6,8 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import Medium, Spectrum
 
 _SERIES_BELOW = 0.35
 """Limit of q below which the numerator is summed as a series, because ``sinh y - y`` would cancel."""
@@ -35,8 +34,7 @@ def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
     big = np.where(small, 1.0, q)
     decay, decay2 = np.exp(-2 * big), np.exp(-4 * big)
     high = (a * (1 - decay2) / 2 - 2 * big * decay) / (a * (1 + decay2) / 2 + (2 * big**2 + c) * decay)
-    shape: FloatArray = np.where(small, low, high)
-    return shape
+    return np.asarray(np.where(small, low, high))
 
 
 def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,7 +1,14 @@
-"""The interface of skin media to the solver: a stiffness per Fourier mode and a local law."""
+"""The interface of skin media to the solver: a stiffness per Fourier mode and a local law.
+
+Conversion between fields of the skin and flat real vectors of their Fourier coefficients.
+
+The coefficients are scaled so that the dot product of two vectors is the sum over cells of the product of the fields:
+energy, gradient and conjugate directions are computed in Fourier space, where the skin's own stiffness is a diagonal.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,7 +16,150 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinGrid
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+
+
+class Spectrum:
+    """Fourier transforms on one grid, of a periodic sheet or of a sheet mirrored at both ends along x.
+
+    Along x, fields of a mirrored sheet are sums of cosines and continue as their own images.
+    """
+
+    def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
+        self.shape = (grid.x_mm.size, grid.s_mm.size)
+        self.mirrored = mirrored
+        nx, ns = self.shape
+        self.half = (nx, ns // 2 + 1)
+        self.size = 2 * self.half[0] * self.half[1]
+        """Number of coefficients in a flat vector."""
+        dx, ds = grid.cell_mm
+        self.area_mm2 = dx * ds
+        """Area of one cell of the grid."""
+        kx = np.pi / (nx * dx) * np.arange(nx) if mirrored else 2 * np.pi * np.fft.fftfreq(nx, dx)
+        ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
+        self.kx = kx[:, None]
+        """(nx, 1) wave numbers of the modes along x, 1/mm."""
+        self.k2 = self.kx**2 + ks**2
+        """(nx, ns//2+1) squared wave numbers of the modes, 1/mm²."""
+        # Columns between the first and the last stand for themselves and their conjugates.
+        weight = np.full((1, self.half[1]), math.sqrt(2.0))
+        weight[0, 0] = 1.0
+        if ns % 2 == 0:
+            weight[0, -1] = 1.0
+        root = math.sqrt(ns if mirrored else nx * ns)
+        if mirrored:
+            self._cosines = math.sqrt(2.0 / nx) * np.cos(np.pi / nx * np.outer(np.arange(nx), np.arange(nx) + 0.5))
+            self._cosines[0] *= math.sqrt(0.5)
+        self._forward = weight / root
+        self._backward = root / weight
+        self._buffer = np.empty(self.half, dtype=np.complex128)
+
+    def of(self, field: FloatArray) -> FloatArray:
+        """Return the (size,) vector of a (nx, ns) field."""
+        # Numpy's transforms are as quick as scipy's, whose package takes 40 ms to import.
+        coefficients = np.fft.rfft(self._cosines @ field) if self.mirrored else np.fft.fft(np.fft.rfft(field), axis=0)
+        coefficients *= self._forward
+        # NumPy 1.26 returns the transform along the first axis in column order.
+        flat: FloatArray = np.ascontiguousarray(coefficients).view(np.float64).reshape(-1)
+        return flat
+
+    def field(self, vector: FloatArray) -> FloatArray:
+        """Return the (nx, ns) field of a (size,) vector."""
+        np.multiply(vector.view(np.complex128).reshape(self.half), self._backward, out=self._buffer)
+        if self.mirrored:
+            return self._cosines.T @ np.fft.irfft(self._buffer, self.shape[1])
+        real: FloatArray = np.fft.irfft(np.fft.ifft(self._buffer, axis=0), self.shape[1])
+        return real
+
+    def diagonal(self, multiplier: FloatArray) -> FloatArray:
+        """Return the (size,) factors that act on a flat vector as the (nx, ns//2+1) `multiplier` acts on the modes."""
+        return np.repeat(multiplier.reshape(-1), 2)
+
+
+class LowModes:
+    """The softest Fourier modes as an orthonormal real basis, in which a varying stiffness is a small matrix.
+
+    A local stiffness D(x) couples modes k and k' by its own Fourier coefficients at ``k - k'`` and ``k + k'``; so
+    the matrix is assembled from one transform of D, without integration.
+    """
+
+    def __init__(self, spectrum: Spectrum, stiffness: FloatArray, *, count: int, zero_mean: bool) -> None:
+        nx, ns = spectrum.shape
+        nh = spectrum.half[1]
+        rows, columns = np.meshgrid(np.arange(nx), np.arange(nh), indexing="ij")
+        signed = rows if spectrum.mirrored else np.where(rows > nx // 2, rows - nx, rows)
+        # One of each pair of conjugates, and no mode at the Nyquist rim, where cosine and sine coincide.
+        free = ((columns > 0) | (signed > 0)) & (2 * columns < ns)
+        free &= spectrum.mirrored | (2 * np.abs(signed) < nx)
+        chosen = np.flatnonzero(free)
+        order = np.argsort(stiffness.reshape(-1)[chosen], kind="stable")
+        chosen = np.sort(chosen[order[:count]])
+        m, n = signed.reshape(-1)[chosen], columns.reshape(-1)[chosen]
+        self._modes = chosen.size
+        self._mean = not zero_mean
+        self.size = 2 * self._modes + int(self._mean)
+        """Number of basis functions: cosines, sines and, unless the mean is held at zero, the constant."""
+        apart, together = m[:, None] - m, m[:, None] + m
+        less, more = (n[:, None] - n) % ns, (n[:, None] + n) % ns
+        # On a periodic sheet modes of the first column are stored twice, as k and -k, each with half of the weight.
+        twice, norm, self._along = n == 0, np.ones(m.size), None
+        ways = np.stack([apart % nx, together % nx])[:, None]
+        if spectrum.mirrored:
+            # In a product of cosines along x both wave numbers go with either one along s. Modes of the first column
+            # and row have norms of their own; one without a wave along s has no sine, only the row of one.
+            twice = n < 0
+            ways = np.broadcast_to(np.stack([np.abs(apart), together]), (2, 2, *apart.shape))
+            self._along = np.cos(np.pi / nx * np.outer(np.arange(together.max() + 1), np.arange(nx) + 0.5))
+            norm = np.where(m > 0, 1.0, math.sqrt(0.5)) * np.where(n > 0, 1.0, math.sqrt(0.5))
+        self._places_apart, self._places_together = ways[0] * ns + less, ways[1] * ns + more
+        self._norms, self._own, self._own_norm = (
+            np.outer(norm, norm),
+            m % nx * ns + n,
+            norm * math.sqrt(2.0 * len(ways[0])),
+        )
+        doubled = np.where(twice, math.sqrt(2.0), 1.0)
+        constant = int(self._mean)
+        self._places = np.concatenate([2 * chosen, 2 * chosen + 1, np.zeros(constant, dtype=np.intp)])
+        self._scales = np.concatenate([doubled, doubled, np.ones(constant)])
+        pairs = np.flatnonzero(twice)
+        mirror = ((-m[pairs]) % nx) * nh
+        self._mirror_places = np.concatenate([2 * mirror, 2 * mirror + 1])
+        self._mirror_from = np.concatenate([pairs, self._modes + pairs])
+        root = math.sqrt(0.5)
+        self._mirror_scales = np.concatenate([np.full(pairs.size, root), np.full(pairs.size, -root)])
+        self._cells = nx * ns
+        flat = stiffness.reshape(-1)
+        self._stiffness = np.concatenate([flat[chosen], flat[chosen], flat[:constant]])
+
+    def take(self, vector: FloatArray) -> FloatArray:
+        """Return the (size,) coefficients of the low modes in a flat vector."""
+        return np.asarray(vector[self._places] * self._scales)
+
+    def put(self, coefficients: FloatArray, vector: FloatArray) -> None:
+        """Overwrite the low modes of a flat vector by their (size,) coefficients."""
+        vector[self._places] = coefficients / self._scales
+        vector[self._mirror_places] = coefficients[self._mirror_from] * self._mirror_scales
+
+    def matrix(self, local: FloatArray, out: FloatArray) -> None:
+        """Fill ``out[:size, :size]`` with the matrix of ``K + local`` for a (nx, ns) local stiffness."""
+        moments = np.fft.fft2(local) if self._along is None else np.fft.fft(self._along @ local)
+        moments = moments.reshape(-1) / self._cells
+        difference, total = (
+            moments[places].sum(axis=0) * self._norms for places in (self._places_apart, self._places_together)
+        )
+        n = self._modes
+        # Coefficient at q: sum D cos(qx) - i sum D sin(qx), over the number of cells.
+        np.add(difference.real, total.real, out=out[:n, :n])
+        np.subtract(difference.real, total.real, out=out[n : 2 * n, n : 2 * n])
+        # The stored sine coefficient is minus the sine's own: out[n+i, j] = -<sin_i, D cos_j>.
+        np.add(total.imag, difference.imag, out=out[n : 2 * n, :n])
+        out[:n, n : 2 * n] = out[n : 2 * n, :n].T
+        if self._mean:
+            own = moments[self._own] * self._own_norm
+            out[2 * n, :n], out[2 * n, n : 2 * n] = own.real, own.imag
+            out[:n, 2 * n], out[n : 2 * n, 2 * n] = own.real, own.imag
+            out[2 * n, 2 * n] = moments[0].real
+        diagonal = np.einsum("ii->i", out[: self.size, : self.size])
+        diagonal += self._stiffness
 
 
 class LocalLaw(Protocol):

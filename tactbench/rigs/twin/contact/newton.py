@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.spectrum import LowModes
+from tactbench.rigs.twin.contact.media import LowModes, Medium
 
 TOLERANCE = 1e-6
 """Largest relative residual of a solution that is returned."""
@@ -43,7 +42,7 @@ class Solution:
     """Solved state of the skin under one load."""
 
     vector: FloatArray
-    """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
+    """(size + 1,) Fourier coefficients of the deflection (none in a closed form) and, last, the approach [mm]."""
     deflection_mm: FloatArray
     """(nx, ns) deflection of the skin."""
     pressure_mpa: FloatArray

@@ -28,7 +28,7 @@ from tactbench.plugin.simulation import (
     TransducerFactory,
 )
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import AnyPress, Press, whole_skin
+from tactbench.rigs.twin.contact.press import AnyPress, LocalPress, Press, whole_skin
 from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -54,11 +54,11 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
         return press, whole_skin
     grid = press.medium.grid
     read = _reader(run.sensor, grid, names)
-    if not (run.tangential or run.sensor.spec.reads_shear):
+    if not ("shear" in run.lent or run.sensor.spec.reads_shear):
         return press, read
     from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 
-    along = tangential_of(run.skin, grid) if run.tangential else None
+    along = tangential_of(run.skin, grid) if "shear" in run.lent else None
     return press, lambda state: read(state if state.shear_mpa is not None else pressed_state(state, along))
 
 
@@ -68,13 +68,13 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     gap = gap_mm(grid, run.contact, skin.sheet)
     if fidelity.solver == "local":
-        from tactbench.rigs.twin.contact.local import LocalPress
-
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
     core = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
-        core = functools.partial(load_object(run.lent["core"]), skin=skin)
-    tolerance, fluid_pressure = fidelity.newton_tolerance, run.fluid_pressure
+        from tactbench.rigs.twin.contact.shell import with_core
+
+        core = functools.partial(with_core, skin=skin)
+    tolerance, fluid_pressure = fidelity.newton_tolerance, "fluid-pressure" in run.lent
     return Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=fluid_pressure, tolerance=tolerance)
 
 
@@ -102,7 +102,7 @@ def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Read:
 def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
     """Return a slide's direction and static friction; None without a slide or a channel that responds to shear."""
     slide = run.scene.slide
-    if slide is None or not run.tangential or not run.load.largest_n > 0:
+    if slide is None or "shear" not in run.lent or not run.load.largest_n > 0:
         return None
     angle = slide.direction.to("rad")
     return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")

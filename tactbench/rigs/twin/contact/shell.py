@@ -1,13 +1,18 @@
-"""Model of the BioTac's skin: an elastic sleeve over an incompressible fluid."""
+"""Model of the BioTac's skin: an elastic sleeve over an incompressible fluid, and a rigid core under the fluid.
+
+The core carries load where the fluid film is closed. It is added only when a load closes the film: below that load the
+solutions with and without the core are the same.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FluidBackedShell, SkinGrid
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium
-from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium, Spectrum
 from tactbench.rigs.twin.geometry import outer_radius_mm
 
 
@@ -67,3 +72,22 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
         return pressure, 0.5 * float(pressure.reshape(-1) @ deflection_mm.reshape(-1))
 
     return respond
+
+
+def with_core(medium: Medium, skin: FluidBackedShell) -> Medium:
+    """Return `medium` with a core that carries load where less than the residual film is left: a one-sided spring."""
+    film_mm = medium.rest_thickness_mm - medium.least_thickness_mm
+    stiffness, below = skin.core_stiffness.to("MPa/mm"), medium.respond
+
+    def respond(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+        pressure, energy = below(deflection_mm, tangent)
+        pressed = deflection_mm - film_mm
+        np.maximum(pressed, 0.0, out=pressed)
+        tangent += stiffness * (pressed > 0)
+        flat = pressed.reshape(-1)
+        energy += 0.5 * stiffness * float(flat @ flat)
+        pressed *= stiffness
+        pressure += pressed
+        return pressure, energy
+
+    return replace(medium, respond=respond)

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-import hashlib
-import time
+import dataclasses
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, Scalar
-from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
+from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import pressed, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
+from tactbench.rigs.twin.fidelity import FINE, RUNGS
 from tactbench.rigs.twin.geometry import check_contact, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
 if TYPE_CHECKING:
-    from tactbench.rigs.twin.contact.slide_table import SlideTable
+    from tactbench.rigs.twin.contact.tangential import SlideTable
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
 """Kinds of channels that a sensor's transducer computes."""
 _MOST_TABLES = 64
+TABLE_SHARE = 1 / 3
+"""Share of a tolerance that the load table may use; the contact solver may use the rest."""
+_PROBES = (0.3, 1.0)
+"""Shares of the largest load at which a contact solver is compared with the next more accurate one."""
+_CHOSEN: dict[str, tuple[str, float]] = {}
 
 
 @dataclass(frozen=True)
@@ -35,28 +40,19 @@ class _Tabulated:
     remarks: Mapping[str, Scalar]
 
 
-_TABLES: dict[bytes, _Tabulated] = {}
+_TABLES: dict[str, _Tabulated] = {}
 
 
 def press_skin(run: Synthesis) -> None:
-    """Raise an error for a contact that the grid cannot resolve; the solver runs when a reading is first needed."""
+    """Solve the contact for the loads of the recording; raise an error if the grid cannot resolve it."""
     sheet = run.skin.sheet
     check_contact(skin_grid(sheet, run.fidelity.cells(sheet)), run.contact)
+    skin_under_load(run)
 
 
 def forget_tables() -> None:
     """Drop all load tables that this process has kept: the next recording solves its contact again."""
     _TABLES.clear()
-
-
-def watch_fluid(run: Synthesis) -> None:
-    """Request that every solved load states the pressure of the fluid in the skin."""
-    run.fluid_pressure = True
-
-
-def watch_shear(run: Synthesis) -> None:
-    """Request that every solved load states the tangential displacement and traction of the skin."""
-    run.tangential = True
 
 
 def read_skin(run: Synthesis) -> None:
@@ -85,10 +81,7 @@ def read_skin(run: Synthesis) -> None:
 
 
 def skin_under_load(run: Synthesis) -> LoadTable:
-    """Return the load table of this recording's skin and channels; it is solved once.
-
-    The table holds the fluid's pressure only if that was requested before the first call.
-    """
+    """Return the load table of this recording's skin and channels; it is solved once."""
     return _tables(run).table
 
 
@@ -130,37 +123,27 @@ def read_names(run: Synthesis) -> list[str]:
 def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: bool = False) -> _Tabulated:
     spec, tolerance = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
-        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{tolerance}|{only_skin}"
-        f"|{run.tangential}|{slide_of(run)}"
+        f"{spec}|{run.contact}|{largest!r}|{names}|{sorted(run.lent)}|{run.fidelity}|{tolerance}|{only_skin}"
+        f"|{slide_of(run)}"
     )
-    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
-    if key in _TABLES:
-        return _TABLES[key]
-    began = time.perf_counter()
-    made = _tabulate(run, names, largest, within_reach=not only_skin)
-    # Whichever effect needs the table first, its time is that of the contact.
-    spent = time.perf_counter() - began
-    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + spent
-    run.elsewhere_s += spent
-    if len(_TABLES) == _MOST_TABLES:
-        del _TABLES[next(iter(_TABLES))]
-    _TABLES[key] = made
-    return made
-
-
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
+    if text in _TABLES:
+        return _TABLES[text]
     press, read = pressed(run, names, run.fidelity)
-    tolerance, nodes = _tolerance(run, names), run.fidelity.most_nodes
-    table = build_table(press, read, largest_n=largest, tolerance=tolerance, most_nodes=nodes)
+    tolerances, nodes = _tolerance(run, names), run.fidelity.most_nodes
+    table = build_table(press, read, largest_n=largest, tolerance=tolerances, most_nodes=nodes)
     slide, sliding = slide_of(run), None
     if names and slide is not None:
-        from tactbench.rigs.twin.contact.slide_table import build_slide_table
+        from tactbench.rigs.twin.contact.tangential import build_slide_table
 
         sliding = build_slide_table(press, read, table, run.skin, *slide)
-    if within_reach:
+    if not only_skin:
         check_reach(press, largest, run.skin.sheet)
     remarked = remarks(press, largest, run.skin.sheet)
-    return _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
+    made = _Tabulated(table, sliding, press.touched_core, press.closing_at(largest), remarked)
+    if len(_TABLES) == _MOST_TABLES:
+        del _TABLES[next(iter(_TABLES))]
+    _TABLES[text] = made
+    return made
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
@@ -209,3 +192,64 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
     elif not tabulated.touched_core:
         left = f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
         run.settled["core"] = Settled(False, f"never touches the core below {table.loads_n[-1]:g} N: {left}")
+
+
+def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
+    """Give `run` the cheapest contact solver that keeps the scene's tolerance, and the estimate of the solver's error.
+
+    The error is the solver's largest difference to the next more accurate one, over two loads and all channels. The
+    last solver's error is at most its difference to the one before: halving the cells at least halves the error.
+
+    Raises
+    ------
+    RigError
+        If no contact solver keeps the tolerance; the message states the smallest error reached.
+    """
+    tolerance = run.scene.simulation.tolerance
+    if tolerance is None:
+        return
+    # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
+    spec, body = run.sensor.model_dump_json(), (run.contact.radius_mm, run.contact.shape)
+    key = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{slide_of(run)}"
+    if key not in _CHOSEN:
+        _CHOSEN[key] = _cheapest(run, names, largest_n, tolerance)
+    run.rung, run.rung_error = _CHOSEN[key]
+    run.fidelity = dataclasses.replace(RUNGS[run.rung], most_nodes=FINE.most_nodes)
+
+
+def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: float) -> tuple[str, float]:
+    error, own = float("inf"), _probed(run, names, largest_n, next(iter(RUNGS)))
+    for low, high in itertools.pairwise(RUNGS):
+        coarser, own = own, _probed(run, names, largest_n, high)
+        if coarser is None or own is None:
+            continue
+        error = float(np.max(np.abs(coarser - own)))
+        if error <= (1 - TABLE_SHARE) * tolerance:
+            return low, error
+    last = list(RUNGS)[-1]
+    if error <= 2 * (1 - TABLE_SHARE) * tolerance:
+        return last, error / 2
+    raise RigError(
+        f"No contact solver keeps the scene's tolerance {tolerance:g}: the finest is off by {error / 2:.2g}.",
+        hint="Give a larger tolerance, or a sensor spec with more cells.",
+    )
+
+
+def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> FloatArray | None:
+    """Return the readings' changes from rest at the compared loads; for an observed slide, those in full slip, too.
+
+    None if the contact solver `name` does not support this skin.
+    """
+    try:
+        press, read = pressed(run, names, RUNGS[name])
+    except RigError:
+        return None
+    states = [press(share * largest_n) for share in _PROBES]
+    slide = slide_of(run)
+    if names and slide is not None:
+        from tactbench.rigs.twin.contact.tangential import dragged_state, tangential_of
+
+        along, (direction, friction) = tangential_of(run.skin, press.medium.grid), slide
+        states += [dragged_state(state, state, along, direction, friction, 0.0) for state in states]
+    rest = read(press(0.0))
+    return np.stack([read(state) - rest for state in states])

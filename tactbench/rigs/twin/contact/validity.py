@@ -9,10 +9,8 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.plugin.simulation import SkinGrid, SkinSheet
-from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import STEEPEST, around_mm
-from tactbench.rigs.twin.shapes import RIM
+from tactbench.rigs.twin.geometry import RIM, STEEPEST, around_mm
 
 RESOLVED_CELLS = 3.0
 """Smallest contact radius, in cells, at which the mesh does not affect the result. Measured on the ideal grid with a
@@ -66,7 +64,12 @@ def remarks(press: AnyPress, force: float, sheet: SkinSheet) -> dict[str, Scalar
         )
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond {HELD_AGAINST_N:g} N, up to which the model was compared"
-    found |= _too_deep(press.medium, press(force).deflection_mm)
+    medium = press.medium
+    beyond = float((press(force).deflection_mm - medium.rest_thickness_mm).max())
+    if medium.has_core and beyond > INTO_THE_CORE * float(medium.rest_thickness_mm.max()):
+        found["remark core"] = f"the skin stands {beyond:.2f} mm inside the core, whose penalty is softer than a core"
+    if not medium.has_core and beyond > 0:
+        found["remark depth"] = f"the skin is pressed {beyond:.2f} mm deeper than it is thick"
     along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, sheet))
     along, across = along[pressure > 0], across[pressure > 0]
     radius, reach = press.contact.radius_mm, float(np.hypot(along, across).max())
@@ -102,15 +105,4 @@ def _active(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_]:
     else:
         low, high, arc = (edge.to("mm") for edge in sheet.pad)
         along, across = (x_mm >= low) & (x_mm <= high), s_mm <= arc / 2
-    active: npt.NDArray[np.bool_] = along[:, None] & across[None, :]
-    return active
-
-
-def _too_deep(medium: Medium, deflection_mm: FloatArray) -> dict[str, Scalar]:
-    beyond = float((deflection_mm - medium.rest_thickness_mm).max())
-    deepest = float(medium.rest_thickness_mm.max())
-    if medium.has_core and beyond > INTO_THE_CORE * deepest:
-        return {"remark core": f"the skin stands {beyond:.2f} mm inside the core, whose penalty is softer than a core"}
-    if not medium.has_core and beyond > 0:
-        return {"remark depth": f"the skin is pressed {beyond:.2f} mm deeper than it is thick"}
-    return {}
+    return np.asarray(along[:, None] & across[None, :])

@@ -10,8 +10,11 @@ import math
 
 from tactbench.plugin import ChannelKind, Quantity, Scene, SensorSpec
 from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
-from tactbench.rigs.twin.effects.heated_core import NEEDED, THERMISTOR
 
+NEEDED = ("heater_power", "heat_resistance", "heat_capacity")
+"""Names of the parameters that a sensor with a heated core must state."""
+THERMISTOR = ("thermistor_b", "thermistor_p", "thermistor_q")
+"""Names of the parameters that a sensor with a thermistor must state."""
 NOT_OBSERVED = "no observed channel depends on it"
 NO_LOAD = "the scene has no load: 0 N throughout"
 NO_FLUID = "the skin holds no fluid"
@@ -32,6 +35,11 @@ def _largest(scene: Scene, sensor: SensorSpec, *fields: str) -> Quantity | None:
     return max((one for one in found if one is not None), key=lambda quantity: quantity.value, default=None)
 
 
+def _under_load(scene: Scene, text: str, unit: str = "count") -> Reason:
+    """Return a Reason to include an effect in a scene with a load, and to leave it out of others."""
+    return Reason(True, text, None, unit) if scene.profile.largest_n > 0 else _no(NO_LOAD, unit)
+
+
 def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason:
     if size is None or not size.value:
         return _no(f"the spec states no {what} for the observed channels")
@@ -48,28 +56,22 @@ def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
     drive = scene.drive
     if drive is None:
         return _no("the scene declares no drive: the force follows its profile, 0 N off", "N")
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD, "N")
     filtered = "unfiltered" if drive.cutoff is None else f"behind a low-pass at {drive.cutoff}"
     steps = "a step per sample" if drive.rate is None else f"steps at {drive.rate}"
-    return Reason(True, f"a motor presses by the measured force, {filtered}, {drive.delay} late, {steps}", None, "N")
+    return _under_load(scene, f"a motor presses by the measured force, {filtered}, {drive.delay} late, {steps}", "N")
 
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes contact: an indenter presses the skin."""
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD)
-    return Reason(True, f"{scene.indenter} pressed with up to {scene.profile.largest_n:g} N")
+    return _under_load(scene, f"{scene.indenter} pressed with up to {scene.profile.largest_n:g} N")
 
 
 def core(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes the rigid core: the skin may touch it through a fluid film."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return _no("the skin has no core under a fluid film")
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD)
     left = sensor.skin.film.most_mm - sensor.skin.residual_film.to("mm")
-    return Reason(True, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
+    return _under_load(scene, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
 
 
 def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -81,13 +83,11 @@ def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 
 def shear(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes shear: an observed channel reads the tangential state of the skin."""
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD)
     looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
     if not looking:
         return _no("no observed channel responds to tangential motion of the skin")
     slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
-    return Reason(True, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
+    return _under_load(scene, f"{' and '.join(looking)} channels read the tangential displacement of the skin{slides}")
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -178,15 +178,10 @@ def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
 def hum(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes a hum of the dynamic pressure without contact."""
     size = sensor.parameters.get("hum")
-    if "ac_pressure" not in scene.observe:
-        return _no("no channel of dynamic pressure is observed")
-    if size is None or not size.value:
-        return _no("the spec states no hum")
-    scale = scene.environment.noise_scale
-    if not scale:
-        return _no("the scene scales noise by 0")
-    low, high = sensor.parameters["hum_low"], sensor.parameters["hum_high"]
-    return Reason(True, f"{size} rms between {low} and {high}, scaled by {scale:g}", scale * size.value)
+    if size is None or "ac_pressure" not in scene.observe:
+        return _no("no observed channel has a hum")
+    text = f"{{}} rms between {sensor.parameters['hum_low']} and {sensor.parameters['hum_high']}"
+    return _scaled(scene.environment.noise_scale, size, "hum", text)
 
 
 def converter(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -220,21 +215,21 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
     slide = scene.slide
     if slide is None:
         return _no("no tangential motion: the scene does not slide")
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD)
     late = slide.start.to("s") - scene.profile.duration.to("s")
     if late >= 0:
         return _no(f"the slide would start {late:g} s after the recording's end")
-    return Reason(True, f"slides at {slide} under up to {scene.profile.largest_n:g} N")
+    return _under_load(scene, f"slides at {slide} under up to {scene.profile.largest_n:g} N")
 
 
 def friction(scene: Scene, sensor: SensorSpec) -> Reason:
     """Decide whether the scene includes friction: a loaded surface moves over the skin."""
     found = _slides(scene, sensor)
-    if not found.called_for or scene.slide is None:
+    if scene.slide is None or not found.called_for:
         return found
-    static, kinetic = scene.slide.surface.static_friction.to("1"), scene.slide.surface.kinetic_friction.to("1")
-    return found._replace(text=f"{found.text}; friction {static:g} to {kinetic:g}")
+    surface = scene.slide.surface
+    return found._replace(
+        text=f"{found.text}; friction {surface.static_friction.value:g} to {surface.kinetic_friction.value:g}"
+    )
 
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -290,9 +285,9 @@ def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
     indenter = scene.environment.indenter_temperature
     if indenter is None:
         return _no("the scene's indenter is as warm as what it touches: 0 K apart")
-    if not scene.profile.largest_n > 0:
-        return _no(NO_LOAD)
-    return Reason(True, f"an indenter at {indenter} touches a heated core in a room at {scene.environment.ambient}")
+    return _under_load(
+        scene, f"an indenter at {indenter} touches a heated core in a room at {scene.environment.ambient}"
+    )
 
 
 def thermal_drift(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -49,10 +49,9 @@ def rest_spread(run: Synthesis) -> None:
     if stated is None:
         return
     for track in run.tracks:
-        columns = track.by_kind().get("taxel")
-        if columns:
-            numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
-            track.readings[:, columns] += stated.value * numbers
+        columns = track.by_kind().get("taxel", [])
+        numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
+        track.readings[:, columns] += stated.value * numbers
 
 
 def unit_rest(run: Synthesis) -> None:
@@ -60,15 +59,16 @@ def unit_rest(run: Synthesis) -> None:
     if run.scene.first_unit:
         return
     for track, kind, columns, nuisances in _stated(run):
+        shared = run.of_unit("shared rest", kind).standard_normal()
+        own = run.of_every_channel(track, kind, run.of_unit("own rest", kind))
         stated = []
-        if nuisances.unit_rest_shared is not None:
-            shared = float(run.of_unit("shared rest", kind).standard_normal())
-            track.readings[:, columns] += nuisances.unit_rest_shared.value * shared
-            stated.append(f"{nuisances.unit_rest_shared} together ({nuisances.unit_rest_shared.source.tag})")
-        if nuisances.unit_rest_own is not None:
-            own = run.of_every_channel(track, kind, run.of_unit("own rest", kind))
-            track.readings[:, columns] += nuisances.unit_rest_own.value * own
-            stated.append(f"{nuisances.unit_rest_own} each ({nuisances.unit_rest_own.source.tag})")
+        for spread, of_what, numbers in (
+            (nuisances.unit_rest_shared, "together", shared),
+            (nuisances.unit_rest_own, "each", own),
+        ):
+            if spread is not None:
+                track.readings[:, columns] += spread.value * numbers
+                stated.append(f"{spread} {of_what} ({spread.source.tag})")
         if stated:
             run.drawn["remark unit rest"] = (
                 f"units beside 1 are drawn: rest levels of {kind} channels differ by {' and '.join(stated)}, sd"
@@ -104,7 +104,7 @@ def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nui
     field = math.sqrt(share * channels / dimensions) * (basis @ (basis.T @ smooth))
     names = [channel.name for channel in run.sensor.spec.channels(kind)]
     recorded = [names.index(channel.name) for channel in track.channels if channel.kind == kind]
-    return np.asarray(math.sqrt(1.0 - share) * white + field[recorded])
+    return math.sqrt(1.0 - share) * white + field[recorded]
 
 
 def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
@@ -122,7 +122,7 @@ def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
     columns = np.stack([u, v, u * u, u * v, v * v], axis=1)
     columns -= columns.mean(axis=0)
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)])
+    return left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)]
 
 
 def _scaled(values: FloatArray) -> FloatArray:
@@ -175,10 +175,9 @@ def hum(run: Synthesis) -> None:
         return
     size = run.scene.environment.noise_scale * stated["hum"].value
     low_hz, high_hz = stated["hum_low"].to("Hz"), stated["hum_high"].to("Hz")
-    for track in run.tracks:
-        for column in track.by_kind().get("ac_pressure", []):
-            draws = run.of_recording("hum", track.channels[column].name)
-            track.readings[:, column] += band_noise(track.t_s, size, low_hz, high_hz, draws)
+    for track, column in run.columns("ac_pressure"):
+        draws = run.of_recording("hum", track.channels[column].name)
+        track.readings[:, column] += band_noise(track.t_s, size, low_hz, high_hz, draws)
 
 
 def band_noise(
@@ -233,9 +232,9 @@ def converter(run: Synthesis) -> None:
     for track in run.tracks:
         for column, channel in enumerate(track.channels):
             nuisances = run.nuisances(channel.kind)
-            reading = track.readings[:, column]
-            if nuisances is not None and nuisances.step.value > 0:
-                reading = np.round(reading / nuisances.step.value) * nuisances.step.value
+            reading, step = track.readings[:, column], 0.0 if nuisances is None else nuisances.step.value
+            if step > 0:
+                reading = np.round(reading / step) * step
             lower = -np.inf if channel.lower is None else channel.lower
             upper = np.inf if channel.upper is None else channel.upper
             reading = np.clip(reading, lower, upper)
@@ -249,11 +248,9 @@ def force_noise(run: Synthesis) -> None:
     Tangential components come from the same sensor and get noise of the same size, drawn independently.
     """
     spread = run.scene.environment.force_noise.to("N")
-    run.reference_n += spread * run.of_recording("force").standard_normal(run.t_s.size)
-    for name, (channel, true) in run.reference_more.items():
-        if channel.kind == "force":
-            own = spread * run.of_recording("force", name).standard_normal(run.t_s.size)
-            run.reference_more[name] = (channel, true + own)
+    _change_forces(
+        run, lambda true, *name: true + spread * run.of_recording("force", *name).standard_normal(run.t_s.size)
+    )
 
 
 def force_filter(run: Synthesis) -> None:
@@ -266,7 +263,12 @@ def force_filter(run: Synthesis) -> None:
     if cutoff is None:
         return
     tau_s = time_constant_s(cutoff.to("Hz"))
-    run.reference_n = lag(run.t_s, run.reference_n, tau_s)
+    _change_forces(run, lambda read, *_: lag(run.t_s, read, tau_s))
+
+
+def _change_forces(run: Synthesis, change: Callable[..., FloatArray]) -> None:
+    """Replace every reading (n,) of the force sensor by `change` of it, which is also given a tangential one's name."""
+    run.reference_n = change(run.reference_n)
     for name, (channel, read) in run.reference_more.items():
         if channel.kind == "force":
-            run.reference_more[name] = (channel, lag(run.t_s, read, tau_s))
+            run.reference_more[name] = (channel, change(read, name))

@@ -8,9 +8,8 @@ import numpy as np
 
 from tactbench.plugin import ChannelSpec, Quantity, SensorSpec, assumed, derived
 from tactbench.rigs.twin.contact.stages import round_contact_mm
-from tactbench.rigs.twin.effects.skin_mode import Mode
-from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
-from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
+from tactbench.rigs.twin.contact.tangential import shear_modulus_mpa, sliding_stiffness
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive, Mode
 from tactbench.rigs.twin.synthesis import Synthesis
 
 GRID_HZ = 500.0

@@ -1,14 +1,17 @@
-"""Vibration of the skin along its normal while a rough surface slides over it."""
+"""Vibration of the skin along its normal while a rough surface slides over it, and the fluid's dynamic pressure."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from tactbench.plugin import FloatArray, Quantity, assumed
+from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable, Quantity, assumed
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, round_contact_mm, skin_under_load
 from tactbench.rigs.twin.effects.friction import mode_of
-from tactbench.rigs.twin.effects.skin_mode import shaken
+from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.effects.stick_slip import shaken
 from tactbench.rigs.twin.synthesis import Synthesis
 
 LIFT: Quantity = assumed(
@@ -98,3 +101,43 @@ def patch_mean(turn: FloatArray) -> FloatArray:
     # By its series for small arguments, where the difference loses its digits: next term below 2e-10.
     series = 1.0 - turn**2 / 10.0 + turn**4 / 280.0
     return np.where(small, series, 3.0 * (np.sin(safe) - safe * np.cos(safe)) / safe**3)
+
+
+def ac_pressure(run: Synthesis) -> None:
+    """Add the band-passed pressure of the fluid to every channel of dynamic pressure.
+
+    The fluid's pressure follows the load; a vibration of the skin adds its amplitude times the slope of the pressure
+    with depth at that load, so that no separate parameter is needed.
+    """
+    table = skin_under_load(run)
+    for track in run.tracks:
+        columns = track.by_kind().get("ac_pressure", [])
+        pressure_mpa = table.skin(track.force_n).fluid_pressure_mpa
+        if track.vibration_mm is not None:
+            slope = table.per_mm(lambda loads_n: table.skin(loads_n).fluid_pressure_mpa[:, None], track.force_n)
+            pressure_mpa = pressure_mpa + slope[:, 0] * track.vibration_mm
+        for column in columns:
+            channel = track.channels[column]
+            if channel.scale is None:
+                raise NotApplicable(
+                    f"{channel.name} states no scale (Pa/count), which is needed to convert its pressure to counts.",
+                    hint="State the channel's scale (Pa/count) in the sensor's spec.",
+                )
+            passed_pa = within_band(track.t_s, 1e6 * pressure_mpa, channel)
+            track.readings[:, column] += passed_pa / channel.scale.to("Pa/count")
+
+
+def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
+    """Return (n,) pressures, linear between samples, filtered by the band of a channel.
+
+    The filters are a first-order high-pass and a first-order low-pass with their corners at the band's ends, exact for
+    any step. The makers state the ends; no source states the order.
+    """
+    if channel.band is None:
+        raise NotApplicable(
+            f"{channel.name} states no band (Hz), which is needed to filter its pressure.",
+            hint="State the channel's band in the sensor's spec.",
+        )
+    low, high = channel.band.lower, channel.band.upper
+    passed = pressure_pa - lag(t_s, pressure_pa, 1.0 / (2.0 * math.pi * low))
+    return lag(t_s, passed, 1.0 / (2.0 * math.pi * high))

@@ -50,9 +50,10 @@ class Tables:
         (self.data / name).parent.mkdir(parents=True, exist_ok=True)
         (self.data / name).write_bytes(text if isinstance(text, bytes) else text.encode())
 
-    def run(self, text="", *, replace=False, progress=None, **change):
+    def run(self, text="", *, replace=None, **change):
         mapping = write_mapping(self.mapping, text, **change)
-        return import_tables(mapping, root=self.data, out=self.out, progress=progress, replace=replace)
+        options = {} if replace is None else {"replace": replace}
+        return import_tables(mapping, root=self.data, out=self.out, **options)
 
     def refused(self, *says, text="", **change):
         with pytest.raises(TactbenchError) as caught:

@@ -2,6 +2,9 @@
 
 import pytest
 
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.mapping.formats import require_format
+
 from .made import rows
 
 
@@ -85,6 +88,11 @@ def test_columns_that_are_not_used_are_named_once(tables):
 def test_a_file_is_named_by_its_first_bytes(tables, content, says):
     tables.put("press.csv", content)
     tables.refused("press.csv", says)
+
+
+def test_a_file_that_cannot_be_read_is_named(tables):
+    with pytest.raises(MappingError, match="press"):
+        require_format(tables.data, "press", "csv")
 
 
 def test_letters_alone_make_no_other_format(tables):

@@ -29,7 +29,7 @@ def test_a_table_with_a_clock_a_unit_and_a_sentinel(tables, name, cells, lines):
     assert (force.quality[1::2] == Quality.MISSING).all()
     np.testing.assert_allclose(force.data[::2, 0], np.arange(0, 40, 2) * 9.80665e-3, rtol=1e-15)  # one multiplication
     assert sorted(meta.counts.values()) == [20, 40, 40]
-    assert (meta.simulated, meta.clock, meta.origin) == (False, "host", "press.csv")
+    assert (meta.simulated, meta.clock, meta.origin, meta.remarks) == (False, "host", "press.csv", ())
 
 
 def test_times_since_1970_keep_every_digit(tables):
@@ -37,6 +37,16 @@ def test_times_since_1970_keep_every_digit(tables):
     tables.put("press.csv", "1743486221.590758001,1,2,3,4\n1743486221.590758002,1,2,3,5\n")
     _, streams = read(tables.run(tables__table__time__epoch="unix"))
     assert streams["taxels"].t_ns.tolist() == [1743486221590758001, 1743486221590758002]
+
+
+@pytest.mark.parametrize(("stamp", "year"), [("31535999.9", "1970"), ("7258118400.1", "2200")])
+def test_times_since_1970_are_of_1971_to_2199(tables, stamp, year):
+    """Other times are in another unit, or of a clock that begins at 0."""
+    since_1970 = {"tables__table__time__epoch": "unix"}
+    tables.put("press.csv", f"31536000,1,2,3,4\n{stamp},1,2,3,5\n")
+    tables.refused("press.csv:2", year, **since_1970)
+    tables.put("press.csv", "31536000,1,2,3,4\n7258118400,1,2,3,5\n")
+    assert tables.run(**since_1970).rows == 2
 
 
 def test_columns_by_name_ranges_and_combinations(tables):
@@ -56,7 +66,9 @@ def test_columns_by_name_ranges_and_combinations(tables):
               object: {column: object}
               slipped: {column: slipped, values: {0: stable, 1: slipped}}
     """)
-    taxels = read(report)[1]["taxels"]
+    meta, streams = read(report)
+    taxels = streams["taxels"]
+    assert (len(meta.remarks), meta.remarks[0][:8]) == (1, "No clock")
     assert [channel.name for channel in taxels.spec.channels] == ["ff.1", "ff.2", "th.1", "th.2"]
     assert {(one.sign, one.lower, one.upper, one.rest) for one in taxels.spec.channels} == {(0, None, None, None)}
     assert taxels.data.tolist() == [[1, 2, 3, 4], [5, 6, 7, 8]]
@@ -82,10 +94,10 @@ def test_records_of_several_lines_below_a_line_that_is_left_out(tables):
     assert np.array_equal(taxels.data, np.arange(20)[:, None] * [2, 3, 1] % [99, 99, 5])
 
 
-@pytest.mark.parametrize("name", ["npz", "mat"])
-def test_an_archive_of_arrays(tables, name):
-    X = np.random.default_rng(0).normal(size=(11, 5, 3)).astype(np.float32)
-    arrays = {"X": X, "y": np.arange(11) % 2}
+@pytest.mark.parametrize(("name", "count", "first"), [("npz", 10, "r0"), ("mat", 11, "r00")])
+def test_an_archive_of_arrays(tables, name, count, first):
+    X = np.random.default_rng(0).normal(size=(count, 5, 3)).astype(np.float32)
+    arrays = {"X": X, "y": np.arange(count) % 2}
     np.savez_compressed(tables.data / "x.npz", **arrays)
     scipy.io.savemat(tables.data / "x.mat", arrays, do_compression=True)
     report = tables.run(f"""
@@ -102,7 +114,7 @@ def test_an_archive_of_arrays(tables, name):
             dtype: float32
             channels: [{{columns: 0..2, name: "t{{column}}", kind: taxel, unit: count}}]
     """)
-    assert [imported.meta.name for imported in report.recordings] == [f"r{index:02d}" for index in range(11)]
+    assert (len(report.recordings), report.recordings[0].meta.name) == (count, first)
     meta, streams = read(report, 7)
     assert np.array_equal(streams["taxels"].data, X[7])
     assert meta.labels == {"slip": "yes", "block": "1"}
@@ -303,6 +315,7 @@ def unsigned(values):
         (np.where(ROWS % 100 < 10, -1, PRESSES + 5), "`sentinels: [-1]`"),
         (np.where(ROWS % 500 == 250, -9999, PRESSES), "`sentinels: [-9999]`"),
         (unsigned(400 * PRESSES - 40 + ROWS % 90), "65536"),
+        (unsigned(np.random.default_rng(2).normal(6, 4, 600)), "65536"),
         (PRESSES, ""),
         (np.minimum(PRESSES, 6), ""),
         (np.full(600, 7), ""),

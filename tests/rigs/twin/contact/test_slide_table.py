@@ -22,8 +22,13 @@ from tactbench.plugin.simulation import BondedLayer, SkinSheet, Slide
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.contact.slide_table import build_slide_table, dragged_state, traction_shares
-from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
+from tactbench.rigs.twin.contact.tangential import (
+    build_slide_table,
+    dragged_state,
+    pressed_state,
+    tangential_of,
+    traction_shares,
+)
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.planner import plan_scene
 from tests.rigs.twin.conftest import EFFECTS, q, unrounded

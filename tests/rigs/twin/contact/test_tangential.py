@@ -13,10 +13,14 @@ from hypothesis import strategies as st
 from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.press import Press, at_rest
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
-from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
+from tactbench.rigs.twin.contact.tangential import (
+    dragged_state,
+    pressed_state,
+    sliding_stiffness,
+    tangential_of,
+    traction_shares,
+)
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
-from tactbench.rigs.twin.partial_slip import sliding_stiffness
 from tests.oracles.layers import bonded_layer
 
 YOUNG, SIDE_MM, MU = 1.0, 12.0, 0.6

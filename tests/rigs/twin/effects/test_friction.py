@@ -9,9 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.rigs.twin.effects.skin_mode import Mode, is_caught, slip_s, swing
-from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
-from tactbench.rigs.twin.partial_slip import shear_modulus_mpa
+from tactbench.rigs.twin.contact.tangential import shear_modulus_mpa
+from tactbench.rigs.twin.effects.stick_slip import STICK, Dragged, Drive, Mode, is_caught, slip_s, swing
 from tests.oracles.layers import bonded_layer
 
 
@@ -120,7 +119,8 @@ def test_the_work_of_the_drive_is_stored_or_dissipated(speed, damping, stribeck)
     dragged = Dragged(_drive([1.0, 1.0], seconds=8.0, speed_mm_s=speed, mode=mode, stribeck_mm_s=stribeck))
     stiffness = float(dragged.drive.stiffness[0])
     damper = 2.0 * damping / mode.omega * stiffness
-    instants = np.sort(np.concatenate([dragged.caught_s, dragged.let_go_s]))[:101]
+    caught_s = dragged._begin[dragged._kind == STICK]
+    instants = np.sort(np.concatenate([caught_s, dragged.let_go_s]))[:101]
     assert instants.size == 101
     nodes, weights = np.polynomial.legendre.leggauss(60)
     work = dissipated = 0.0
@@ -133,7 +133,7 @@ def test_the_work_of_the_drive_is_stored_or_dissipated(speed, damping, stribeck)
         work += float(np.sum(seen.force_n * speed * dt))
         dissipated += float(np.sum((seen.force_n * seen.slip_mm_s + damper * velocity**2) * dt))
         at_begin, at_end = dragged(np.array([begin, until])).displacement_mm
-        if begin in dragged.caught_s:
+        if begin in caught_s:
             # Mindlin's annulus: 0.6 k dx^2 of work on the way to full slip, of which the spring keeps 0.5.
             dissipated += 0.1 * stiffness * (at_end - at_begin) ** 2
         worst = max(worst, abs(work - dissipated - 0.5 * stiffness * at_end**2))

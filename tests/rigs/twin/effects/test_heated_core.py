@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Scene, assumed
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin.effects.heated_core import (
+from tactbench.rigs.twin.effects.heat import (
     HeatedCore,
     Thermistor,
 )
@@ -36,17 +36,6 @@ def test_a_constant_contact_is_followed_exactly_whatever_the_steps(steps, conduc
     goal, tau = _equilibrium(conductance, indenter_c)
     # Rounding of numbers of some hundred.
     np.testing.assert_allclose(found, goal + (start_c - goal) * np.exp(-t_s / tau), atol=1e-10)
-
-
-@given(st.floats(0, 100), st.floats(0, 0.05), st.floats(0, 3000))
-def test_warmth_lies_between_none_and_the_whole_difference(indenter_c, conductance, since):
-    scene = SCENE.model_copy(update={"environment": Environment(since_power_on=assumed(since, "s", "t"))})
-    t_s = np.linspace(0, 60, 30)
-    warmth = CORE.warmth(scene, t_s, np.full(30, conductance), indenter_c)
-    apart = indenter_c - CORE.untouched(scene, t_s)
-    assert np.all(warmth >= min(0.0, float(apart.min())) - 1e-9)
-    assert np.all(warmth <= max(0.0, float(apart.max())) + 1e-9)
-    assert np.abs(warmth).max() <= np.abs(apart).max() * conductance * 60 / CORE.capacity_j_per_k + 1e-9
 
 
 def test_the_untouched_core_is_the_same_circuit_without_a_contact():

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
 from tactbench.plugin.simulation import Surface
-from tactbench.rigs.twin.effects.ac_pressure import within_band
 from tactbench.rigs.twin.effects.channels import band_noise
-from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean
+from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean, within_band
 from tests.rigs.twin.conftest import q
 
 RATE_HZ = 2200.0

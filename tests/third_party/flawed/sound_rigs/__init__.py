@@ -1,4 +1,4 @@
-"""A simulated rig that ramps a force, and one that moves a motor."""
+"""A simulated rig that ramps a force."""
 
 from tactbench.plugin import RigDescriptor, hookimpl
 
@@ -7,7 +7,4 @@ TACTBENCH_API = 2
 
 @hookimpl
 def tactbench_rigs():
-    return [
-        RigDescriptor(name="sound-rig", title="A ramp", where="sound_rigs.code:build", simulated=True),
-        RigDescriptor(name="sound-press", title="A motor presses", where="sound_rigs.code:build_press"),
-    ]
+    return [RigDescriptor(name="sound-rig", title="A ramp", where="sound_rigs.code:build", simulated=True)]

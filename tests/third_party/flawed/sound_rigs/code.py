@@ -1,7 +1,5 @@
-"""The rigs; nothing is opened, and a skin lets go of its load at once."""
+"""The rig; nothing is opened."""
 
-import os
-import signal
 from contextlib import contextmanager
 
 import numpy as np
@@ -10,8 +8,6 @@ from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
 FZ = ChannelSpec(name="fz", kind="force", unit="N", sign=1)
 FORCE = StreamSpec(name="force_torque", rate_hz=100.0, channels=(FZ,))
-STOPPED = []
-LEFT_N = 0.0
 
 
 class Ramp:
@@ -32,49 +28,11 @@ class Ramp:
         yield Block("force_torque", t_ns, (self.force + self.rng.normal(0.0, 0.002, len(t_ns)))[:, None])
 
 
-class Press(Ramp):
-    """A motor's press, block by block."""
-
-    clocks, stream_counts, counts, emulation, ended = {}, {}, {}, None, ""
-    stopped, signal_at = False, None
-
-    def __iter__(self):
-        for begin in range(0, len(self.t_s), 20):
-            rows = slice(begin, begin + 20)
-            t_ns = np.round(1e9 * self.t_s[rows]).astype(np.int64)
-            force = self.force[rows] + LEFT_N
-            if begin == self.signal_at:
-                os.kill(os.getpid(), signal.SIGINT)
-            if self.stopped:
-                force = 0.0 * force
-            for stream in self.streams:
-                data = 100.0 + np.outer(np.round(10.0 * force), np.ones(len(stream.channels)))
-                yield Block(stream.name, t_ns, data)
-            yield Block("force_torque", t_ns, force[:, None])
-            if self.stopped:
-                return
-
-    def stop(self, why):
-        STOPPED.append(why)
-        self.stopped = True
-        return ""
-
-
 class Rig:
-    made = Ramp
-
     @contextmanager
     def open(self, sensor, scene, *, seed):
-        yield self.made(sensor, scene, seed)
-
-
-class PressRig(Rig):
-    made = Press
+        yield Ramp(sensor, scene, seed)
 
 
 def build(context):
     return Rig()
-
-
-def build_press(context):
-    return PressRig()

@@ -11,7 +11,7 @@ from tactbench.plugin import (
     TaskDescriptor,
     TaskSpec,
     hookimpl,
-    press_hold_release,
+    staircase,
 )  # fmt: skip
 from tactbench.plugin.simulation import EffectDescriptor, Reason
 
@@ -38,7 +38,7 @@ def tactbench_indenters():
 
 @hookimpl
 def tactbench_tasks():
-    profile = press_hold_release(peak=2, rise=1, dwell=1, release=0.1, rest=0, rate=20)
+    profile = staircase(peak=2, steps=1, rise=1, dwell=1, rate=20)
     for what, naming in NAMING.items():
         scenes = tuple(
             PlannedScene(role=role, scene=Scene(name=f"{what}-{role}", session=role, profile=profile, **naming))

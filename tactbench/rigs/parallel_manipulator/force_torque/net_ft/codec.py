@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from tactbench.plugin import ChannelSpec, Quality, RigError, StreamSpec
+from tactbench.plugin import ChannelSpec, Quality, StreamSpec
 from tactbench.plugin.devices import Options
 
 if TYPE_CHECKING:
@@ -65,18 +65,12 @@ class NetFtOptions(Options):
         return wrench
 
     def counts(self, wrench: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
-        counts = np.rint(np.asarray(wrench, dtype=float) * self._divisors)
-        # np.clip would take ten times as long for six.
-        return np.minimum(np.maximum(counts, -(2**31)), 2**31 - 1).astype(np.int64)
+        """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m]."""
+        return np.rint(np.asarray(wrench, dtype=float) * self._divisors).astype(np.int64)
 
     @cached_property
     def _divisors(self) -> FloatArray:
         return np.repeat([self.counts_per_newton, self.counts_per_newton_metre], 3)
-
-
-class DatagramError(RigError, ValueError):
-    """A datagram does not belong to this protocol."""
 
 
 class Command(IntEnum):
@@ -91,15 +85,13 @@ def encode_request(command: Command, records: int = 0) -> bytes:
     return _REQUEST.pack(_HEADER, command, records)
 
 
-def decode_request(data: bytes) -> tuple[Command, int]:
-    """Return command and number of records in a datagram; raises DatagramError if it is not a request."""
+def decode_request(data: bytes) -> tuple[Command, int] | None:
+    """Return command and number of records in a datagram; None: it is not a request of this protocol."""
     try:
         header, command, count = _REQUEST.unpack(data)
-        if header == _HEADER:
-            return Command(command), count
+        return (Command(command), count) if header == _HEADER else None
     except (struct.error, ValueError):
-        pass
-    raise DatagramError(f"{data!r} is not a request: {_REQUEST.size} bytes, header {_HEADER:04X}, known command.")
+        return None
 
 
 def encode_record(rdt_sequence: int, ft_sequence: int, status: int, counts: Iterable[int]) -> bytes:
@@ -112,11 +104,9 @@ def decode_records(data: bytes) -> npt.NDArray[np.void]:
 
     Raises
     ------
-    DatagramError
-        If the data are not one or more whole records.
+    ValueError
+        If the data are no whole number of records.
     """
-    if not data or len(data) % RECORD_BYTES:
-        raise DatagramError(f"{len(data)} bytes are not a whole number of records of {RECORD_BYTES} bytes.")
     return np.frombuffer(data, RECORDS)
 
 
@@ -125,13 +115,12 @@ WARNING = ERROR_SUMMARY | CONDITION_LATCHED
 """Status word after a threshold set in the box was passed; its record is good (sourced: pyNetFT, status.cpp)."""
 
 
-def quality(status: int) -> Quality:
-    """Return the quality mark of all six channels, which distinguishes saturation from other errors.
+def quality(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
+    """Return for each status word the quality mark of all six channels: saturation apart from other errors.
 
     Errors are SUSPECT, not MISSING: the box's manual forbids use of the values, yet many status bits (on networks and
     other buses) do not concern the values, and the mark SUSPECT keeps them for the user's decision.
     """
-    if status in (0, WARNING):
-        return Quality.GOOD
-    marks = Quality.SATURATED if status & SATURATION else Quality.GOOD
-    return marks | Quality.SUSPECT if status & ~(WARNING | SATURATION) or not marks else marks
+    saturated = (status & SATURATION).astype(bool)
+    good = np.isin(status, (0, WARNING)) | ((status | WARNING) == WARNING | SATURATION)
+    return np.asarray(saturated * Quality.SATURATED + ~good * Quality.SUSPECT, dtype=np.uint8)

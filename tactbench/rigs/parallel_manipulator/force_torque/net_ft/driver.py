@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, StreamSpec
+from tactbench.plugin import Block, RigError, StreamSpec
 from tactbench.plugin.devices import (
     DatagramLink,
     Driver,
@@ -77,7 +77,7 @@ class NetFtDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Counts of ``rejected`` datagrams, of records with ``errors``, ``saturated`` (an error) or ``warnings``."""
+        """Counts of ``rejected`` datagrams, and of records with ``errors`` (also saturation) or ``warnings``."""
         return +self._counts
 
     def identify(self) -> Mapping[str, str]:
@@ -164,19 +164,16 @@ class NetFtDriver(Driver):
     def _block(self, received: list[Received]) -> Block:
         records = decode_records(b"".join(piece.data for piece in received))
         ticks, numbers = self._ticks(records["ft_sequence"]), self._numbers(records["rdt_sequence"])
+        status = records["status"]
+        marks = quality(status)
+        self._counts["errors"] += int((marks != 0).sum())
+        self._counts["warnings"] += int(((status != 0) & (marks == 0)).sum())
         return Block(
             stream=STREAM,
             t_ns=np.array([piece.t_ns for piece in received], dtype=np.int64),
             data=self.options.wrench(records["counts"]),
-            quality=self._marks(records["status"]) if records["status"].any() else None,
+            quality=np.repeat(marks[:, None], len(AXES), axis=1) if status.any() else None,
             sequence=numbers,
             # 10^9 / 7000 in whole numbers.
             device_ns=ticks * 1_000_000 // 7,
         )
-
-    def _marks(self, status: np.typing.NDArray[np.uint32]) -> np.typing.NDArray[np.uint8]:
-        marks = np.array([quality(word) for word in status.tolist()], dtype=np.uint8)
-        self._counts["errors"] += int((marks != 0).sum())
-        self._counts["saturated"] += int(((marks & Quality.SATURATED) != 0).sum())
-        self._counts["warnings"] += int(((status != 0) & (marks == 0)).sum())
-        return np.repeat(marks[:, None], len(AXES), axis=1)

@@ -27,7 +27,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
-    DatagramError,
     NetFtOptions,
     decode_request,
     encode_record,
@@ -72,10 +71,9 @@ class RdtEmulator(DeviceEmulator):
         self._now_s = 0.0
         self._next: int | None = None
         """Number of the sensor sample that is sent next; None: the box is not sampling."""
-        self._left = 0
-        """Number of records still to be sent; 0: unlimited, until stopped."""
         self._sequence = 1
-        self._held: bytes | None = None
+        self._held: list[Sent] = []
+        """Datagrams delayed by a fault until the next one is sent."""
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Process one datagram from the host; return the same as `poll`.
@@ -84,15 +82,10 @@ class RdtEmulator(DeviceEmulator):
         """
         sent = self.poll(now_s)
         assert isinstance(piece, bytes)
-        try:
-            command, records = decode_request(piece)
-        except DatagramError:
-            return sent
-        sent += self._ended(self._now_s)
-        if command is Command.START_REALTIME:
-            self._left, self._sequence = records, 1
+        if request := decode_request(piece):  # the driver asks for records until it stops the box, not for a number
             # The first sample after the request: no sample is older than its request.
-            self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
+            self._next = None if request[0] is Command.STOP else math.floor(self._now_s * SENSOR_RATE_HZ) + 1
+            self._sequence, self._held = 1, []
         return sent
 
     def poll(self, now_s: float) -> list[Sent]:
@@ -111,36 +104,24 @@ class RdtEmulator(DeviceEmulator):
         at_s = sample / SENSOR_RATE_HZ
         # Number by number: numpy would take longer for six, and this is done a thousand times a second.
         sensed = self._senses(at_s)
-        wrench = [(sensed.get(name, 0.0), end) for name, end in zip(AXES, LARGEST, strict=True)]
-        saturated = any(abs(value) >= end for value, end in wrench) or any(
-            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
-        )
-        counts = self.options.counts([min(max(value, -end), end) for value, end in wrench]).tolist()
+        wrench = [sensed.get(name, 0.0) for name in AXES]
+        within = [min(max(value, -end), end) for value, end in zip(wrench, LARGEST, strict=True)]
+        saturated = within != wrench or any(one.name == "saturated" and one.active(at_s) for one in self.faults)
+        counts = self.options.counts(within).tolist()
         status = SATURATION | ERROR_SUMMARY if saturated else 0
         record = encode_record(self._sequence, (sample + 1) % SEQUENCE_MODULUS, status, counts)
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         self._next = sample + self.options.every
-        sent = self._on_the_way(record, at_s)
-        self._left -= 1
-        return sent + self._ended(at_s) if self._left == 0 else sent
-
-    def _ended(self, at_s: float) -> list[Sent]:
-        """Stop sending; return a datagram that was delayed by a fault, if any."""
-        self._next = None
-        return self._released(at_s)
-
-    def _released(self, at_s: float) -> list[Sent]:
-        held, self._held = self._held, None
-        return [] if held is None else [(at_s, held)]
+        return self._on_the_way(record, at_s)
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
         """Return the datagrams that arrive when a datagram is sent, in the order of arrival."""
         dropped, doubled, late = (
             fault_concerns(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
         )
-        if dropped:
+        arrived: list[Sent] = [] if dropped else [(at_s, datagram)] * (1 + doubled)
+        if late and not self._held:
+            self._held = arrived
             return []
-        if late and self._held is None:
-            self._held = datagram
-            return [(at_s, datagram)] * doubled
-        return [(at_s, datagram)] * (1 + doubled) + self._released(at_s)
+        held, self._held = self._held, []
+        return arrived + [(at_s, piece) for _, piece in held]
