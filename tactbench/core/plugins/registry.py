@@ -14,6 +14,7 @@ from copy import copy
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, get_args
@@ -263,12 +264,9 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 
     Raises PluginError if it violates the contract of its hooks, and any error raised in its own code.
     """
-    module, here = cast(ModuleType, point.load()), hookspecs.API_VERSION
-    if (stated := getattr(module, "TACTBENCH_API", None)) != here:
-        raise PluginContractError(
-            f"{point.value} states TACTBENCH_API = {stated!r}, but this tactbench has version {here} of the interface.",
-            hint=f"Update the older of plugin and tactbench, and state TACTBENCH_API = {here}: see docs/stability.md.",
-        )
+    _check_api_version(point.value, _stated_version(point.value))
+    module = cast(ModuleType, point.load())
+    _check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
@@ -297,6 +295,24 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 def _mappings_beside(module: ModuleType) -> bool:
     """Return True if a package has mappings of data sets: see tactbench.core.recording.datasets."""
     return any(any(Path(folder).glob("datasets/*.yaml")) for folder in getattr(module, "__path__", ()))
+
+
+def _stated_version(module: str) -> object:
+    """Return the interface version in a module's source text, by default the current one; importing may fail."""
+    origin = getattr(find_spec(module), "origin", None)
+    text = Path(origin).read_text(encoding="utf-8", errors="replace") if origin else ""
+    found = re.search(r"^TACTBENCH_API\b[^=\n]*=\s*(\d+)", text, re.MULTILINE)
+    return int(found[1]) if found else hookspecs.API_VERSION
+
+
+def _check_api_version(module: str, written_for: object) -> None:
+    """Raise PluginContractError if a plugin was written for another version of the plugin interface."""
+    here = hookspecs.API_VERSION
+    if written_for != here:
+        raise PluginContractError(
+            f"{module} states TACTBENCH_API = {written_for!r}, but this tactbench has version {here} of the interface.",
+            hint=f"Update the older of plugin and tactbench, and state TACTBENCH_API = {here}: see docs/stability.md.",
+        )
 
 
 @cache

@@ -129,7 +129,7 @@ BAD = {
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "SensorSpec, not SensorDescriptor"),
     # Nothing of a plugin is used unless all of it is right.
     "another-kind": (f"{EVERYTHING}@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()", "not EffectD"),
-    "of-another-version": ("TACTBENCH_API = 99", "TACTBENCH_API = 99"),
+    "of-another-version": ("TACTBENCH_API = 99\nimport nothing_such", "TACTBENCH_API = 99"),
     "aborts": ("import os; os.abort()", "signal 6"),
 }
 
