@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim", "alarm": "yellow", "inside": "bold"}
 _GAP, _MARGIN = 2, 1
-_LONG_WORD = 12
-"""Number of characters from which a word may be broken."""
+_LEAST = 4
+"""Smallest width of a column of words [characters]."""
 WITHOUT_EDGE = 400
 """Width of a table in a file or a pipe [characters], enough for all columns with names of ordinary length."""
 Part = TextTable | Sequence[str]
@@ -97,7 +97,7 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
 def _widths(table: TextTable, room: int) -> dict[int, int]:
     """Return the widths of the columns that fit into `room` characters, by index of the column.
 
-    Headings and texts are broken at spaces, and long words; numbers are not, and columns in `first_to_go` go first.
+    Headings and texts are broken at spaces, numbers are not. Columns in `first_to_go` go before a word is cut.
     """
     from rich.cells import cell_len
 
@@ -105,10 +105,8 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
     for place, (name, head, *texts) in enumerate(zip(table.columns, table.headers, *table.lines, strict=True)):
         lines = [line for text in texts for line in text.split("\n")]
         body[place] = max(map(cell_len, lines), default=0)
-        whole = name in table.numeric | table.unbroken
-        words = map(cell_len, (word for text in texts for word in text.split()))
-        longest = body[place] if whole else min(max(words, default=0), _LONG_WORD)
-        least[place] = max(longest, 1, *map(cell_len, head.split()))
+        kept = lines if name in table.numeric | table.unbroken else " ".join(lines).split()
+        least[place] = max(map(cell_len, [*head.split(), *kept, " "]))
         widths[place] = max(1, cell_len(head), body[place])
 
     def excess(of: dict[int, int]) -> int:
@@ -117,7 +115,10 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
     for name in table.first_to_go:
         if excess(least) > 0 and name in table.columns:
             del widths[table.columns.index(name)]
-    while excess(widths) > 0 and (slack := [place for place in widths if widths[place] > least[place]]):
-        # Headings first: breaking one costs a single line.
-        widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
+    words = {place: least[place] if name in table.numeric | table.unbroken else _LEAST
+             for place, name in enumerate(table.columns)}  # fmt: skip
+    for bound in (least, words):
+        while excess(widths) > 0 and (slack := [place for place in widths if widths[place] > bound[place]]):
+            # Headings first: breaking one costs a single line.
+            widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
     return widths
