@@ -70,7 +70,7 @@ def mutants(path: Path) -> list[tuple[int, str, str, str, bool]]:
 
     def visit(node: ast.AST, inside: bool) -> None:
         after = changed(node)
-        if after is not None:
+        if after is not None and (not isinstance(node, ast.Constant) or ast.literal_eval(after) != node.value):
             begin = starts[node.lineno - 1] + node.col_offset  # type: ignore[attr-defined]
             end = starts[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
             source = (text[:begin] + after.encode() + text[end:]).decode()
