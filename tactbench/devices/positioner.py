@@ -374,8 +374,8 @@ class Positioner(Driver):
         if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
             self._due_ns = self.clock() + round(1e9 * SETTLE_S)
             raise PositionerError(
-                f"It has not reached {'its home' if math.isinf(self._goal) else f'{self._goal:g}'} in time, and is at "
-                f"{self.position:g}.",
+                f"The axis has not reached {'its home' if math.isinf(self._goal) else f'{self._goal:g}'} in time; it "
+                f"is at {self.position:g}.",
                 hint="Check what is in its way, and that units and speed in the rig file are those of the controller.",
             )
 

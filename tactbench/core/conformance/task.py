@@ -61,9 +61,9 @@ def names_are_known(subject: Subject) -> None:
 
 @check("task")
 def metric_has_its_unit(subject: Subject) -> None:
-    """The unit is shown with every score, but errors are computed in the target's unit and are not converted.
+    """A task's metric is one of its kind, and its unit, a label beside every score, is the one that the metric has.
 
-    Name a metric of the task's kind; state the target's unit for errors (rmse, mae, mean_euclidean_error), else 1.
+    For errors (rmse, mae, mean_euclidean_error), which are not converted, state the target's unit; else state 1.
     """
     from tactbench.core.evaluation.metrics import METRICS
 

@@ -28,7 +28,7 @@ _Hashes = npt.NDArray[np.uint64]
 
 
 def copied_channels(data: Dataset) -> tuple[str, ...]:
-    """Return a warning that names the channels from which a regression's target, or its size, follows; else ()."""
+    """Return a warning that names channels from which a regression's target, or its magnitude, is computed; else ()."""
     if data.classes:
         return ()
     X, y = (data.column(attrgetter(name), data.labelled) for name in ("X", "y"))

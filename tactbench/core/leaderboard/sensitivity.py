@@ -183,7 +183,7 @@ def _alike(texts: Mapping[str, str]) -> str:
 
 
 def _change(row: Row | None, change: Difference | None) -> tuple[str, str]:
-    """Return as text a sensor's score with a set of ends, and its change from the score as stated."""
+    """Return as text a sensor's score with nuisances at ends of their ranges, and the change of the score."""
     if row is None or change is None:
         return ABSENT, ABSENT if row is None else row["status"]
     unit = row["unit"]

@@ -354,7 +354,7 @@ def build(context: RigContext) -> ParallelManipulator:
     if context.rig_file is None:
         raise UsageError(
             "The rig 'parallel-manipulator' needs a rig file with its devices and limits.",
-            hint="Give one by --rig-file FILE; `tactbench doctor --rig-file FILE` shows its forces.",
+            hint="Give one by --rig-file FILE; `tactbench doctor --rig-file FILE` shows the forces that it permits.",
         )
     file = context.rig_file
     if problems := check(file).problems:

@@ -154,11 +154,11 @@ class Session:
     def travel(
         self, xy_m: tuple[float, float], ask: Callable[[str, str], bool] = lambda doing, text: False
     ) -> Place | None:
-        """Home all axes that are not homed, move the platform above a place; return the place measured, None if fixed.
+        """Home all axes that are not homed, and move the platform above a place; return the place measured there.
 
-        Before, an operator confirms that the indenter is clear of the sensor if this is not known, and the force sensor
-        is checked once. The guard is armed meanwhile: it monitors the force, with the ceiling of travel, and can stop
-        all rails.
+        The place is None without a platform. Before, an operator confirms that the indenter is clear of the sensor if
+        this is not known, and the force sensor is checked once. The guard is armed meanwhile: it monitors the force,
+        with the ceiling of travel, and can stop all rails.
 
         Parameters
         ----------

@@ -128,7 +128,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
     if not kinds:
         raise NotApplicable(
-            f"needs a channel of kind {' or '.join(scene.observe) or '(no kind named)'}; {sensor.name} has "
+            f"The scene needs a channel of kind {' or '.join(scene.observe) or '(none is named)'}; {sensor.name} has "
             f"{', '.join(sorted(present))}."
         )
     return kinds

@@ -132,8 +132,8 @@ class FrameRows:
         """Return the rows that ended since the last call, in one block for each stream with such rows.
 
         With `incomplete`, the last rows end, too: words not received are marked MISSING. A row of ``electrodes`` is one
-        frame. Its times are those of the frame's first command but PAC; in the default frame the others follow every
-        454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
+        frame. Its time is that of the frame's first command other than PAC; in the default frame further electrodes
+        follow every 454.5 us, TDC after 9.5 ms. A row of ``vibration`` is one word with its own times.
         """
         found = []
         for stream, rows in zip(self._streams, self._rows, strict=True):

@@ -241,9 +241,9 @@ class SkinDecoder:
 
     Quality of a sample: missing halves are MISSING, and a head without tail, hence without error word, is SUSPECT.
     A taxel out of range or at 0 or 255 is SATURATED, a taxel out of range also SUSPECT (the board's own test for broken
-    taxels). No acknowledgement and reserved bits make all taxels SUSPECT, not connected makes all MISSING. A doubled
-    frame makes its taxels SUSPECT in the sample that follows. A board in the raw test (type 7) sends the low bytes of
-    its results, which cannot be distinguished from readings.
+    taxels). A missing acknowledgement or a reserved bit that is set makes all taxels SUSPECT, the flag "not connected"
+    makes all MISSING. The taxels of a doubled frame are SUSPECT in the next sample. A board in the raw test
+    (type 7) sends the low bytes of its results, which cannot be distinguished from readings.
 
     Parameters
     ----------

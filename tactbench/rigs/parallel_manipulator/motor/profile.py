@@ -108,7 +108,7 @@ def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable
     steps = int(steps * (1.0 + 4e-16)) if rounded is None else rounded(steps)
     if abs(steps) > largest or (steps == 0 != value and rounded is None):
         raise RigError(
-            f"The drive has no {what} of {value:g}: its unit is {unit:g}, its largest number {largest}.",
+            f"The drive cannot be set to a {what} of {value:g}: it takes steps of {unit:g}, {largest} at most.",
             hint="Check this value and the drive's units in the rig file.",
         )
     return steps

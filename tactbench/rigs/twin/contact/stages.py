@@ -80,7 +80,7 @@ def read_skin(run: Synthesis) -> None:
 
 
 def skin_under_load(run: Synthesis) -> LoadTable:
-    """Return the load table of this recording's skin and channels; it is solved once."""
+    """Return the table of the contact over the load for skin and channels; it is computed at the first call."""
     return _tables(run).table
 
 

@@ -92,7 +92,7 @@ class TangentialResponse:
         return np.zeros((2, *state.pressure_mpa.shape))
 
     def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
-        """Return the (2, nx, ns) displacement [mm] under a traction of the size of the contact pressure.
+        """Return the displacement (2, nx, ns) along x and s [mm] under a shear traction as large as the pressure.
 
         `touched` (nx, ns) is the whole contact; `state` may hold only the pressure of its inner part.
         """
