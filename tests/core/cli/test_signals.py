@@ -55,7 +55,7 @@ def nothing_left(folder):
 )
 def test_a_run_ends_with_a_message_and_leaves_nothing_but_what_was_finished(there, number, begun):
     folder, how = there
-    with ending([*COMMAND, *RUN], **how) as run:
+    with ending([*COMMAND, *RUN, "--repeats", "40"], **how) as run:
         assert until(lambda: any((folder / "out").glob(begun)), 60)
         run.send_signal(number)
         run.send_signal(number)
