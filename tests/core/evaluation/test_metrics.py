@@ -83,6 +83,9 @@ def test_a_share_near_the_middle_has_the_interval_of_the_jackknife_however_few_u
     assert "Clopper" not in found.method
     found = interval(y, np.where(code < 2, 1 - y, y), code, "accuracy", 2)
     assert "Clopper" not in found.method
+    once = np.where(np.arange(200) == 3, y, 1 - y)
+    right, wrong = (interval(y, one, code, "accuracy", 2) for one in (once, 1 - once))
+    assert (right.low, right.high) == pytest.approx((1 - wrong.high, 1 - wrong.low)), "one right as one mistake"
 
 
 @given(st.lists(st.lists(st.floats(-100, 100), min_size=2, max_size=20), min_size=1, max_size=3))

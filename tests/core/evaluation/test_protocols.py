@@ -2,8 +2,11 @@
 
 import pytest
 
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.evaluation.protocols import PROTOCOLS, is_probe, protocol_called, shots, without_options
+from tactbench.core.evaluation.sets import windowed
+
+from .made import force_task
 
 
 @pytest.mark.parametrize(
@@ -25,6 +28,13 @@ def test_options_of_a_protocol(name, every, k):
 def test_what_is_no_protocol_is_refused(name):
     with pytest.raises(TactbenchError):
         protocol_called(name)
+
+
+@pytest.mark.parametrize("field", [{"three_sigma": True}, {"first_row_only": True}, {"k": 0}])
+def test_windows_need_the_samples_as_they_are(field):
+    rules = protocol_called("deployable").model_copy(update=field)
+    with pytest.raises(NotApplicable, match="window=4"):
+        windowed(None, force_task(), rules, 4, 1)
 
 
 def test_one_protocol_is_a_probe_and_few_shots_have_their_number():

@@ -113,6 +113,8 @@ def test_choices_that_do_not_go_together_are_refused(tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
     EngineChoice("in-process", jobs=1).check()
     EngineChoice("isolated", jobs=2).check()
+    recorders = [EngineChoice("isolated", jobs=2).recorder(computed=computed) for computed in (True, False)]
+    assert [one.jobs for one in recorders] == [2, 1], "devices are recorded one at a time"
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     EngineChoice("isolated", jobs=2).check()
     with pytest.raises(UsageError, match="distributed"):
