@@ -21,11 +21,10 @@ from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
-from tactbench.core.leaderboard.formats import records, write_tables
+from tactbench.core.leaderboard.formats import best, grids, records, write_tables
 from tactbench.core.leaderboard.names import grouped
 from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of
 from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
-from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.plan import cell_of
 from tactbench.core.matrix.solve import read_dataset, unanswered
 from tactbench.core.matrix.store import Store
@@ -36,12 +35,11 @@ from tactbench.core.provenance.gather import usable_cores
 from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
-from tactbench.core.study.results import opened, shown_rows, table_of
+from tactbench.core.study.files import opened, shown_rows, table_of
 from tactbench.core.study.study import Study, carry_out
-from tactbench.core.tables.html import html
+from tactbench.core.tables.markup import html
 from tactbench.core.tables.terminal import plain_text
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text import TextTable, visible
 from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
 from tactbench.scoring import (
     Estimators,

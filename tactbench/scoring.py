@@ -33,7 +33,7 @@ from tactbench.core.recording.reader import read_meta
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.row import DIRECTIONS, STOPPED
 from tactbench.core.spec.task import TaskSpec
-from tactbench.core.study.progress import progress
+from tactbench.core.study.terminal import progress
 from tactbench.recordings import Recordings, opened_as
 
 Row = dict[str, Any]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from tactbench.core.cli.grid import print_fields, print_records
-from tactbench.core.cli.options import format_option
+import tactbench
+from tactbench.core.cli.shared import format_option, print_fields, print_records
 from tactbench.core.conformance.check import CHECKS, KINDS
 from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
 from tactbench.core.errors import UnknownNameError, UsageError
@@ -66,8 +66,6 @@ def command(
 
 
 def _plain(report: CheckReport) -> dict[str, object]:
-    import tactbench
-
     return {
         "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level,
         "kit": tactbench.__version__, "checks": [one._asdict() for one in report.outcomes],

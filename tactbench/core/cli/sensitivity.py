@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import print_tables
-from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, format_option, options
+from tactbench.core.cli.shared import JOBS, RESULTS, SIMULATION, format_option, options, print_tables
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed

@@ -10,9 +10,7 @@ from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.row import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
-from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, whole
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import Entry, finite
+from tactbench.core.tables.text import ABSENT, Entry, delay, duration, finite, interval, score, visible, whole
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
 """Kind of a leaderboard line: an answer, a trivial answer, a failed cell or a skipped cell."""

@@ -10,9 +10,7 @@ from typing import Any, Literal
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.statistics.paired import Difference, difference, holm
-from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
+from tactbench.core.tables.text import ABSENT, Entry, TextTable, finite, score, signed, suffix, text_table, visible
 
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]

@@ -11,8 +11,8 @@ from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.study.progress import progress
 from tactbench.core.study.study import Study, matrix_of
+from tactbench.core.study.terminal import progress
 from tactbench.core.tables.terminal import remark
 
 Single = tuple[str, str]

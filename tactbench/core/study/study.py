@@ -19,10 +19,9 @@ from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.yaml_file import load_yaml
-from tactbench.core.study.operator import TerminalOperator
-from tactbench.core.study.progress import progress
-from tactbench.core.study.shipped import matrix_called
-from tactbench.core.study.simulation import simulation_of
+from tactbench.core.study.files import matrix_called
+from tactbench.core.study.options import simulation_of
+from tactbench.core.study.terminal import TerminalOperator, progress
 
 
 def _each(given: Any) -> Any:

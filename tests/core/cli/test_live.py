@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from tactbench.core.cli.live import LiveView
+from tactbench.core.cli.record import LiveView
 from tactbench.core.samples import Block
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import sourced
@@ -40,7 +40,7 @@ def test_the_line_has_force_beside_the_planned_force_and_mean_rates(capsys):
 
 
 ASKS = """
-from tactbench.core.cli.live import LiveView
+from tactbench.core.cli.record import LiveView
 from tests.core.cli.test_live import PAD, RAMP, Scene
 class Acquisition: streams, reference = (PAD,), ()
 with LiveView(Scene(name="fed", profile=RAMP), "pad") as view:

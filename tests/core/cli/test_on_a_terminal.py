@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.core.cli.grid import print_records
 from tactbench.core.cli.run import remark_stopped
+from tactbench.core.cli.shared import print_records
 from tactbench.core.errors import RigError
-from tactbench.core.study.operator import TerminalOperator
-from tactbench.core.study.progress import progress
+from tactbench.core.study.terminal import TerminalOperator, progress
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 
@@ -74,7 +73,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
 
 
 ASKS_TWICE = """
-from tactbench.core.study.operator import TerminalOperator
+from tactbench.core.study.terminal import TerminalOperator
 from tactbench.core.errors import RigError
 operator = TerminalOperator()
 operator.prompt("Place.")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.probe import with_leaks
+from tactbench.core.leaderboard.table import with_leaks
 from tests.core.leaderboard.rows import row
 
 
