@@ -21,6 +21,7 @@ from tactbench.core.provenance.gather import gather
 from tactbench.core.recording.image import require_free
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.samples import Block
+from tactbench.core.spec import units
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.core.study.options import scene_of, simulation_of
@@ -60,8 +61,6 @@ class LiveView:
         """Count the rows of a block, note its newest force, and update the line; no reference to the block is kept."""
         import numpy as np
         from rich.text import Text
-
-        from tactbench.core.spec import units
 
         if not self._drawn or block.stream not in self._streams or block.t_ns is None or not len(block.t_ns):
             return

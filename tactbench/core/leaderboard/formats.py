@@ -13,8 +13,7 @@ from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
-from tactbench.core.leaderboard.names import held_out, metric_name
+from tactbench.core.leaderboard.names import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line, held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
 from tactbench.core.statistics.replicates import against_reference, count_range, percent
@@ -62,7 +61,7 @@ def grids(table: Table, columns: tuple[str, ...] = DEFAULT) -> list[TextTable]:
 
 def grid(block: Block, columns: tuple[str, ...] = DEFAULT) -> TextTable:
     """Return the table to print for a block; columns that were chosen by name are printed though they are empty."""
-    chosen = columns not in (DEFAULT, ALL)
+    chosen = columns not in (DEFAULT, ALL, _IN_A_PAPER)
     # A note states why trivial answers were skipped.
     shown = [one for one in block.lines if one.kind != "skipped" or not one.row["is_baseline"]] or list(block.lines)
     texts = list(map(_texts, shown))
@@ -134,9 +133,7 @@ def latex(table: Table, columns: tuple[str, ...]) -> str:
     names = _IN_A_PAPER if columns in (DEFAULT, ALL) else columns
     grids = []
     for block in table.blocks:
-        # A column of dashes shows that no answer has a place.
-        keep = ("place",) if any(line.texts["place"] for line in block.lines) else ()
-        shown = grid(block, names).compact(keep)
+        shown = grid(block, names)
         grids.append(replace(shown, title=f"{block.title} · {block.setting} · {block.origin}"))
     return latex_of([*grids, *table.sections], wide=False)
 

@@ -14,9 +14,7 @@ from tactbench.core.tables.text import ABSENT, Entry, TextTable, finite, score, 
 
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
-COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict",
-)  # fmt: skip
+COLUMNS = ("of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict")
 _NOTE = (
     "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
     "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all "

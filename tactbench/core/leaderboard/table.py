@@ -14,16 +14,17 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe
-from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import (
     WORSE_END,
     Bars,
+    Line,
     Row,
     answer_name,
     direction,
     error_of,
     grouped,
     hardware_name,
+    line_of,
     metric_name,
     sign_of,
     split_name,

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import tactbench
 from tactbench.core.errors import UsageError, error_text
 from tactbench.core.files import replace_file, writable
-from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.formats import REASON, grid
+from tactbench.core.leaderboard.names import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.progress import Progress
 from tactbench.core.report.datasheet import sensor_table, table_one

@@ -6,9 +6,9 @@ import random
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.columns import OF_ROWS
 from tactbench.core.leaderboard.formats import ALL, best, grids, known_columns, rendered
 from tactbench.core.leaderboard.names import (
+    OF_ROWS,
     answer_name,
     direction,
     hardware_name,
