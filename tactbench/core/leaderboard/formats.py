@@ -131,11 +131,9 @@ _IN_A_PAPER = ("place", "sensor", "estimator", "score", "notes", "interval", "ra
 def latex(table: Table, columns: tuple[str, ...]) -> str:
     """Return the tables as LaTeX, each one column wide, with metric, protocol, split and origin in the caption."""
     names = _IN_A_PAPER if columns in (DEFAULT, ALL) else columns
-    grids = []
-    for block in table.blocks:
-        shown = grid(block, names)
-        grids.append(replace(shown, title=f"{block.title} · {block.setting} · {block.origin}"))
-    return latex_of([*grids, *table.sections], wide=False)
+    titles = [f"{block.title} · {block.setting} · {block.origin}" for block in table.blocks]
+    titled = [replace(grid(block, names), title=title) for block, title in zip(table.blocks, titles, strict=True)]
+    return latex_of([*titled, *table.sections], wide=False)
 
 
 def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: int = terminal.WITHOUT_EDGE) -> bytes:
@@ -160,7 +158,7 @@ def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: in
     elif shape == "latex":
         text = latex(table, columns)
     else:
-        text = csv_of(table) if shape == "csv" else json_array(table)
+        text = csv_text(*_flat(table)) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "backslashreplace")
 
 
@@ -197,13 +195,8 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
-def csv_of(table: Table) -> str:
-    """Return a table as CSV with one line for each record: all keys, and the texts shown in columns ``shown_…``."""
-    return csv_text(*_flat(table))
-
-
 def _flat(table: Table) -> tuple[list[str], list[list[Any]]]:
-    """Return the names of the columns, and the lines, with lists and mappings as JSON."""
+    """Return the names of the columns, all keys and ``shown_…``, and the lines, with lists and mappings as JSON."""
     names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
     return names, [[*map(_field, row.values()), *shown.values()] for row, shown in records(table)]
 

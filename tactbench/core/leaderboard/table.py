@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe
 from tactbench.core.leaderboard.names import (
@@ -30,15 +30,13 @@ from tactbench.core.leaderboard.names import (
     split_name,
 )
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, above, below
+from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
 from tactbench.core.tables.text import ABSENT, TextTable, field_text, score_with_unit, text_table, visible
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Store
 
 _Key = tuple[str, str, str, str]
 
