@@ -9,7 +9,6 @@ from pydantic import ValidationError
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec import force_profiles
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import SlipTarget, nanoseconds
 from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 from tactbench.core.spec.quantity import assumed, derived, measured, sourced
@@ -18,7 +17,7 @@ from tactbench.core.spec.row import FORMAT, JSON_KEYS, OF_REPLICATES, RowModel, 
 from tactbench.core.spec.scene import RANGES, Environment, Indenter, Slide
 from tactbench.core.spec.sensor import Nuisances
 from tactbench.core.spec.skin import SheetTable
-from tactbench.core.spec.task import PlannedScene, Published, in_drawn_order
+from tactbench.core.spec.task import DeclaredTask, PlannedScene, Published, in_drawn_order
 from tactbench.plugin import (
     ChannelSpec,
     ForcePath,

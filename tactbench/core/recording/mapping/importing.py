@@ -42,11 +42,11 @@ from tactbench.core.recording.mapping.samples import compare_clocks, samples, ti
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest, open_recording
 from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Block, Quality, StreamData
-from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TASKS_FILE
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
@@ -149,7 +149,7 @@ def import_tables(
                     )
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
             progress.advance(next(iter(files.files.values())).shown)
-        target = out / FILE
+        target = out / TASKS_FILE
         if tasks and not replace and target.exists() and target.read_text(encoding="utf-8") != tasks:
             raise MappingError(f"{target} exists already and declares other tasks.", hint=_OTHERWISE)
         _write_tasks(folder, tasks)
@@ -249,8 +249,8 @@ def _tasks_text(mapping: Mapping) -> str:
 
 def _write_tasks(folder: Path, text: str) -> None:
     if text:
-        with writable(folder / FILE):
-            (folder / FILE).write_text(text, encoding="utf-8")
+        with writable(folder / TASKS_FILE):
+            (folder / TASKS_FILE).write_text(text, encoding="utf-8")
 
 
 @contextmanager
