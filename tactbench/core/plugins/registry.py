@@ -30,20 +30,11 @@ from tactbench.core.errors import (
     error_text,
 )
 from tactbench.core.plugins import hookspecs
-from tactbench.core.spec.rig import (
-    DeviceDescriptor,
-    EffectDescriptor,
-    EstimatorDescriptor,
-    IndenterDescriptor,
-    ProfileDescriptor,
-    RigDescriptor,
-    SensorDescriptor,
-    TaskDescriptor,
-)
+from tactbench.core.spec import rig
 
 Descriptor = (
-    SensorDescriptor | RigDescriptor | DeviceDescriptor | TaskDescriptor | EstimatorDescriptor | EffectDescriptor
-    | IndenterDescriptor | ProfileDescriptor
+    rig.SensorDescriptor | rig.RigDescriptor | rig.DeviceDescriptor | rig.TaskDescriptor | rig.EstimatorDescriptor
+    | rig.EffectDescriptor | rig.IndenterDescriptor | rig.ProfileDescriptor
 )  # fmt: skip
 D = TypeVar("D", bound=Descriptor)
 
@@ -125,17 +116,17 @@ class Registry:
     """All installed descriptors, by kind."""
 
     def __init__(self) -> None:
-        self.sensors: Family[SensorDescriptor] = Family("sensor")
-        self.rigs: Family[RigDescriptor] = Family("rig")
-        self.devices: Family[DeviceDescriptor] = Family("device")
-        self.tasks: Family[TaskDescriptor] = Family("task")
-        self.estimators: Family[EstimatorDescriptor] = Family("estimator")
-        self.effects: Family[EffectDescriptor] = Family("effect")
-        self.indenters: Family[IndenterDescriptor] = Family("indenter")
-        self.profiles: Family[ProfileDescriptor] = Family("profile")
+        self.sensors: Family[rig.SensorDescriptor] = Family("sensor")
+        self.rigs: Family[rig.RigDescriptor] = Family("rig")
+        self.devices: Family[rig.DeviceDescriptor] = Family("device")
+        self.tasks: Family[rig.TaskDescriptor] = Family("task")
+        self.estimators: Family[rig.EstimatorDescriptor] = Family("estimator")
+        self.effects: Family[rig.EffectDescriptor] = Family("effect")
+        self.indenters: Family[rig.IndenterDescriptor] = Family("indenter")
+        self.profiles: Family[rig.ProfileDescriptor] = Family("profile")
         self.plugins: list[PluginRow] = []
 
-    def with_tasks(self, tasks: Family[TaskDescriptor]) -> Registry:
+    def with_tasks(self, tasks: Family[rig.TaskDescriptor]) -> Registry:
         """Return the registry with `tasks` in place of its tasks."""
         found = copy(self)
         found.tasks = tasks
@@ -172,17 +163,8 @@ _KINDS: dict[str, type[Any]] = {
 def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = 20.0) -> Registry:
     """Load every plugin of the entry-point group, each separately from the others.
 
-    Parameters
-    ----------
-    points
-        Entry points to load instead of the installed ones.
-    timeout_s
-        Longest time that the import of a plugin and its hooks may take [s].
-
-    Returns
-    -------
-    Registry
-        The plugins that could be loaded, and a row for each plugin that could not. A bad plugin raises no error.
+    A bad plugin raises no error: it has a row in the registry. The import of a plugin and its hooks may take
+    `timeout_s` [s]; `points` are entry points to load instead of the installed ones.
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
@@ -250,7 +232,7 @@ def _describe(point: tuple[str, str]) -> dict[str, Any]:
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
     """Return a descriptor as plain data, including a sensor's data sheet, which recordings and keys omit."""
     dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
-    if isinstance(descriptor, SensorDescriptor):
+    if isinstance(descriptor, rig.SensorDescriptor):
         dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
     return dumped
 

@@ -134,11 +134,7 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
 def examine(recording: Recording) -> list[Finding]:
     """Check an open recording and return all findings, the most severe first.
 
-    Returns
-    -------
-    list of Finding
-        Errors (an evaluation would fail or be wrong), warnings (a score may be worse), infos (facts for the reader).
-        Empty list: no findings.
+    Errors: an evaluation would fail or be wrong; warnings: a score may be worse; infos: facts for the reader.
     """
     found = list(_meta_findings(recording))
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}

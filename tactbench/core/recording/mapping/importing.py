@@ -104,10 +104,8 @@ def import_tables(
 
     Parameters
     ----------
-    mapping
-        The mapping file.
-    root
-        Folder of the data set; None is the folder of the mapping file.
+    mapping, root
+        The mapping file, and the folder of the data set; None is the folder of the mapping file.
     out
         Folder for the recordings. After an error, no recording is placed there.
     progress
@@ -118,12 +116,10 @@ def import_tables(
 
     Raises
     ------
-    ConfigError
-        If the mapping file is not valid; the message names the line.
+    ConfigError, UnwritableError
+        If the mapping file is not valid (the message names the line), or `out` cannot be written.
     MappingError
         If a table does not fit the mapping; the message names file, line and column where there are any.
-    UnwritableError
-        If `out` cannot be written.
     """
     loaded = load_yaml(mapping, Mapping)
     sensor, streams = sensor_of(loaded)
@@ -172,20 +168,10 @@ def import_log(
     labels: AnyMapping[str, Scalar],
     replace: bool,
 ) -> ImportReport:
-    """Convert a log file of a sensor's own tools into a recording; after an error, no recording is written.
+    """Convert a log file of a sensor's own tools into a recording at `out`; after an error, none is written.
 
-    Parameters
-    ----------
-    log
-        The log file, in a format that the sensor's log reader supports.
-    options
-        Options of the log reader, by name.
-    out
-        The recording.
-    session, role, labels
-        As the fields of :class:`~tactbench.core.spec.recording.RecordingMeta`.
-    replace
-        True: an existing file at `out` is replaced.
+    `options` are those of the sensor's log reader, by name; `session`, `role` and `labels` are fields of
+    :class:`~tactbench.core.spec.recording.RecordingMeta`. With `replace`, an existing file at `out` is replaced.
 
     Raises
     ------
