@@ -45,10 +45,8 @@ def acquire(
     clock
         Monotonic clock [s]; its difference over the scene, without writing the file, is ``provenance["sim_s"]`` of a
         simulated rig and ``provenance["acquisition_s"]`` of others.
-    opened
-        Called with the acquisition before its first block.
-    watch
-        Called with every block, once it is written.
+    opened, watch
+        Called with the acquisition before its first block, and with every block once it is written.
     complete_interrupted
         Whether an interrupted recording of a real rig is completed, excluded from every evaluation, before the error
         goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. An
@@ -58,10 +56,8 @@ def acquire(
     ------
     RigError, NotApplicable, LinkError
         If the rig cannot carry out the scene, a device sent no row, or moving parts cannot be stopped.
-    KeyboardInterrupt
-        If it was interrupted.
-    RecordingError
-        If the file cannot be written.
+    KeyboardInterrupt, RecordingError
+        If it was interrupted, or the file cannot be written.
     """
     began = clock()
     simulated = request.rig.simulated
@@ -111,7 +107,9 @@ def acquire(
                 lacking = ""
                 if has_devices:
                     _check_not_silent(acquisition, writer.rows)
-                    lacking = _incompleteness(acquisition, whole)
+                    ended = getattr(acquisition, "ended", "")
+                    early = [f"ended before its time: {ended}"] if ended else []
+                    lacking = "; ".join([*early, *whole.lacking(getattr(acquisition, "stream_counts", {}))])
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stop(acquisition, error)
@@ -133,13 +131,6 @@ def acquire(
                 raise RigError(f"The scene {request.scene.name!r} ended, but the rig is not in a safe state: {alarm}.")
             conclude(lacking and INCOMPLETE + lacking)
     return writer.meta
-
-
-def _incompleteness(acquisition: Any, whole: Completeness) -> str:
-    """Return the reason why a recording of devices is incomplete; an empty text if it is complete."""
-    ended = str(getattr(acquisition, "ended", ""))
-    found = [f"ended before its time: {ended}"] if ended else []
-    return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
@@ -250,12 +241,8 @@ class Completeness:
     differ from the row before, or if they never change while the tactile sensor's readings do. A force sensor with a
     coarse display, which repeats readings also under load, may be constant without load.
 
-    Parameters
-    ----------
-    allowed
-        Limits: longest silence, longest time without a change, and share of lost rows.
-    sensor, reference
-        Streams of the tactile sensor and of the force sensor. Only streams with a stated rate are checked for silence.
+    `allowed` limits silence, time without a change, and the share of lost rows; `sensor` and `reference` are streams of
+    the tactile sensor and of the force sensor. Only streams with a stated rate are checked for silence.
     """
 
     def __init__(self, allowed: Allowed, sensor: Sequence[StreamSpec], reference: Sequence[StreamSpec]) -> None:
