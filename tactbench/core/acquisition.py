@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from typing import Any
 
 import numpy as np
@@ -61,8 +61,10 @@ def acquire(
     """
     began = clock()
     simulated = request.rig.simulated
+    if simulated:  # one thread makes the same bytes on every machine; a BLAS can be limited once it is loaded
+        importlib.import_module("scipy.linalg")
     with (
-        _one_thread() if simulated else nullcontext(),
+        thread_limit(1) if simulated else nullcontext(),
         one_interrupt() as ignore_interrupts,
         rig.open(request.sensor, request.scene, seed=request.seed) as acquisition,
     ):
@@ -142,12 +144,6 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
                 f"No row came from {', '.join(names)} during the whole scene.",
                 hint="Check power, cable and speed of the device; `tactbench doctor` tests its link.",
             )
-
-
-def _one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which a simulation gives identical bytes for any number of BLAS threads."""
-    importlib.import_module("scipy.linalg")  # its own BLAS can be limited once it is loaded
-    return thread_limit(1)
 
 
 def _stop(acquisition: Acquisition, error: BaseException) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cache
@@ -170,7 +170,11 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
     found = entry_points(group=hookspecs.GROUP) if points is None else points
     unique = {(point.name, point.value, _owner(point.dist)): point for point in found}
     foreign = [(point.name, point.value) for point in unique.values() if not _is_built_in(point.module)]
-    answers = _described_in_children(sorted(foreign), timeout_s)
+    answers: dict[tuple[str, str], Any] = {}
+    if foreign:
+        from tactbench.core.pool import Limits, Pool
+
+        answers = dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, sorted(foreign)))
     for (name, module, owner), point in sorted(unique.items()):
         _add(registry, point, owner, answers.get((name, module)))
     return registry
@@ -191,7 +195,10 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     try:
         if isinstance(reply, BaseException):
             raise reply
-        offered = ask_plugin(point) if reply is None else _described(reply)
+        if reply is None:
+            offered = ask_plugin(point)
+        else:
+            offered = {name: [_KINDS[name].model_validate(one) for one in several] for name, several in reply.items()}
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", error_text(error))
         reason += line_in(point.module, getattr(error, "traceback_text", ""))
@@ -211,15 +218,6 @@ def line_in(module: str, trace: str) -> str:
     return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 
-def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) -> dict[tuple[str, str], Any]:
-    """Return the descriptors of each plugin, read in a child process, or the error that prevented reading."""
-    if not points:
-        return {}
-    from tactbench.core.pool import Limits, Pool
-
-    return dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, points))
-
-
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Return the descriptors of a plugin as plain data, to be sent between processes."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
@@ -235,10 +233,6 @@ def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[s
     if isinstance(descriptor, rig.SensorDescriptor):
         dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
     return dumped
-
-
-def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
-    return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in reply.items()}
 
 
 def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:

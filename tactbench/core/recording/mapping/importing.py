@@ -173,9 +173,9 @@ def import_log(
     `options` are those of the sensor's log reader, by name; `session`, `role` and `labels` are fields of
     :class:`~tactbench.core.spec.recording.RecordingMeta`. With `replace`, an existing file at `out` is replaced.
 
-    Raises MissingRecordingError if there is no such log; UsageError if the sensor has no reader for logs, the file is no
-    such log, an option is not known, or `out` is no name for a recording; RecordingError if `out` exists or cannot be
-    written.
+    Raises MissingRecordingError if there is no such log, UsageError if the sensor has no reader for logs, the file is
+    no such log, an option is not known or `out` is no name for a recording, and RecordingError if `out` exists or
+    cannot be written.
     """
     if sensor.log_reader is None:
         raise UsageError(
