@@ -28,8 +28,7 @@ from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.report.figures.group import save, styled
 from tactbench.core.report.figures.trade import draw_precision, trade_table, write_trade
-from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.spec.matrix import REPLICATES, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import MOST_REPEATS, REPLICATES, MatrixSpec, TaskChoice
 from tactbench.core.study.files import matrix_called
 from tactbench.core.study.terminal import progress
 from tactbench.core.tables.terminal import remark

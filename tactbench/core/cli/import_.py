@@ -11,8 +11,7 @@ import click
 
 from tactbench.core.cli.shared import field_text, print_fields
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.recording.mapping import ImportReport, import_tables
-from tactbench.core.recording.mapping.importing import import_log
+from tactbench.core.recording.mapping.importing import ImportReport, import_log, import_tables
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.yaml_file import plain_value
 from tactbench.core.study.terminal import progress

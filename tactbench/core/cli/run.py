@@ -15,7 +15,7 @@ from tactbench.core.leaderboard.formats import write_tables
 from tactbench.core.leaderboard.names import DEFAULT
 from tactbench.core.leaderboard.table import over_all
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
+from tactbench.core.spec.matrix import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.study.files import table_of
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.terminal import remark

@@ -11,7 +11,7 @@ from tactbench.core.cli.shared import JOBS, RESULTS, SIMULATION, format_option, 
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.bounds import MOST_REPEATS
+from tactbench.core.spec.matrix import MOST_REPEATS
 from tactbench.core.study.study import Study, carry_out_sensitivity
 from tactbench.core.tables.terminal import remark
 

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.rigs import force_path
 from tactbench.core.spec.profile import ForceProfile, ForceRamp
 from tactbench.core.spec.quantity import Quantity, sourced
 from tactbench.core.spec.rig import Parameter, SensorDescriptor

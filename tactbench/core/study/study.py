@@ -16,8 +16,14 @@ from tactbench.core.matrix.run import EngineChoice, EngineName, Outcome, run_mat
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool import Limits
-from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import (
+    MOST_MEMORY_MB,
+    MOST_REPEATS,
+    MOST_SECONDS,
+    EstimatorChoice,
+    MatrixSpec,
+    TaskChoice,
+)
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.yaml_file import load_yaml
