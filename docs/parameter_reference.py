@@ -5,7 +5,7 @@
 
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.datasheet import quantities, sensor_table
-from tactbench.core.tables.markdown import markdown
+from tactbench.core.tables.markup import markdown
 
 _TITLE = """# Parameters of the simulated sensors
 

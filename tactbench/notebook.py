@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
+from tactbench import scoring
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint, wrong
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
-from tactbench.core.leaderboard.formats import records, write_tables
+from tactbench.core.leaderboard.formats import best, grids, records, write_tables
 from tactbench.core.leaderboard.names import grouped
 from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of
 from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
-from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.plan import cell_of
 from tactbench.core.matrix.solve import read_dataset, unanswered
 from tactbench.core.matrix.store import Store
@@ -36,25 +36,12 @@ from tactbench.core.provenance.gather import usable_cores
 from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
-from tactbench.core.study.results import opened, shown_rows, table_of
+from tactbench.core.study.files import opened, shown_rows, table_of
 from tactbench.core.study.study import Study, carry_out
-from tactbench.core.tables.html import html
+from tactbench.core.tables.markup import html
 from tactbench.core.tables.terminal import plain_text
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text import TextTable, visible
 from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
-from tactbench.scoring import (
-    Estimators,
-    Options,
-    Work,
-    answered,
-    cells_of,
-    ended,
-    name_of,
-    named,
-    question,
-    side_by_side,
-)
 
 if TYPE_CHECKING:
     import pandas
@@ -111,8 +98,8 @@ def load_task(
     DataError
         If no row is left to evaluate; NotApplicable (a DataError) if the recordings lack data that the task needs.
     """
-    options = Options(protocol, split, groups, window=window, step=step, seed=seed)
-    spec, _, paths, how = question(task, recordings, options)
+    options = scoring.Options(protocol, split, groups, window=window, step=step, seed=seed)
+    spec, _, paths, how = scoring.question(task, recordings, options)
     return folds_of(spec, read_dataset(spec, paths), protocol, **how)
 
 
@@ -302,11 +289,11 @@ def evaluate(
     PluginContractError
         If a prediction is not finite, or is not a class.
     """
-    options = Options(protocol, split, groups, metric, greater_is_better, params, window, step, seed)
-    mine, *trivial = cells_of(name_of(estimator), estimator, task, recordings, options)
+    options = scoring.Options(protocol, split, groups, metric, greater_is_better, params, window, step, seed)
+    mine, *trivial = scoring.cells_of(scoring.name_of(estimator), estimator, task, recordings, options)
     data = read_dataset(mine.task, mine.paths)
-    row, answers = answered(mine)
-    rows = [row, *(ended(one, row["simulated"])[0] for one in trivial)]
+    row, answers = scoring.answered(mine)
+    rows = [row, *(scoring.ended(one, row["simulated"])[0] for one in trivial)]
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
     return Result(rows, answers["test"], mine.task, names, mine.how["metric"])
@@ -316,11 +303,11 @@ def run(
     *,
     sensor: str | Sequence[str] = (),
     task: str | Sequence[str] = (),
-    estimator: Estimators = (),
+    estimator: scoring.Estimators = (),
     recordings: Recordings | None = None,
     out: AnyPath = "tactbench-results",
     data: Mapping[str, Recordings] | None = None,
-    estimators: Estimators = (),
+    estimators: scoring.Estimators = (),
     tasks: str | TaskSpec | Sequence[str | TaskSpec] | Mapping[str, Any] = (),
     **options: Any,
 ) -> Results:
@@ -358,7 +345,7 @@ def run(
         if misplaced := [name for name, value in given.items() if value not in ((), None)]:
             raise UsageError(f"`{misplaced[0]}` excludes `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
-    names, objects = named(estimator)
+    names, objects = scoring.named(estimator)
     given = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
     if unknown := given.keys() - Study.model_fields:
         raise UnknownNameError("argument of `run`", min(unknown), Study.model_fields)
@@ -378,14 +365,14 @@ def run(
 
 def _over_data(
     data: Mapping[str, Recordings],
-    estimators: Estimators,
+    estimators: scoring.Estimators,
     tasks: Any,
     out: Path,
     jobs: int | None = None,
     **options: Any,
 ) -> Results:
     """Return the rows of estimators on several data sets, for :func:`run`."""
-    names, objects = named(estimators)
+    names, objects = scoring.named(estimators)
     every: dict[str, str | Estimator] = {**objects, **dict(zip(names, names, strict=True))}
     if not isinstance(data, Mapping) or not data:
         raise wrong("data", data, "a mapping from names of data sets to recordings")
@@ -393,14 +380,14 @@ def _over_data(
         raise wrong("estimators", estimators, "objects and names of estimators, at least one")
     if jobs is not None and not (isinstance(jobs, int) and jobs > 0):
         raise wrong("jobs", jobs, "a whole number, 1 or more")
-    if unknown := options.keys() - set(Options._fields):
-        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *Options._fields))
+    if unknown := options.keys() - set(scoring.Options._fields):
+        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *scoring.Options._fields))
 
     def chosen(value: Any, *of: str) -> Any:
         mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
         return next((value[name] for name in of if name in value), None) if mapped else value
 
-    work_of: dict[str, dict[str, Work]] = {name: {} for name in data}
+    work_of: dict[str, dict[str, scoring.Work]] = {name: {} for name in data}
     splits: dict[tuple[Any, ...], OwnSplit] = {}
     for name, recordings in data.items():
         some = chosen(tasks, name)
@@ -411,7 +398,7 @@ def _over_data(
             for called, given in every.items():
                 own = {key: chosen(value, called, name) for key, value in options.items()}
                 stated = {key: value for key, value in own.items() if value is not None}
-                for work in cells_of(called, given, task, mine, Options(**stated)):
+                for work in scoring.cells_of(called, given, task, mine, scoring.Options(**stated)):
                     if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
                         of = (name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"],
                               id(stated["split"]), id(stated.get("groups")))  # fmt: skip
@@ -422,7 +409,7 @@ def _over_data(
                         work.how["split"] = splits[of]
                     work_of[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
-    for name, rows in side_by_side(work_of, out, jobs or usable_cores()).items():
+    for name, rows in scoring.side_by_side(work_of, out, jobs or usable_cores()).items():
         store = Store(out / name)
         table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
         write_tables(table, store.folder)
@@ -458,4 +445,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no cell of this question has finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return ended(Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]
+    return scoring.ended(scoring.Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]

@@ -30,10 +30,9 @@ from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather
 from tactbench.core.recording.reader import read_meta
-from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.row import DIRECTIONS, STOPPED
-from tactbench.core.spec.task import TaskSpec
-from tactbench.core.study.progress import progress
+from tactbench.core.spec.task import TASKS_FILE, TaskSpec
+from tactbench.core.study.terminal import progress
 from tactbench.recordings import Recordings, opened_as
 
 Row = dict[str, Any]
@@ -65,7 +64,7 @@ def question(
         if not isinstance(given, int | np.integer) or given < least or (name == "step" and given > 1 and not window):
             raise wrong(name, given, f"a whole number, {least} or more{', beside `window`' * (name == 'step')}")
     paths = tuple(one.path for one in opened_as("recordings", recordings))
-    folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
+    folders = {path.parent for path in paths if (path.parent / TASKS_FILE).is_file()}
     registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
     declared = ""
     if isinstance(task, str):

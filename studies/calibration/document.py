@@ -20,8 +20,8 @@ from studies.calibration.analysis import (
     share,
 )
 from studies.calibration.draws import Draw, Procedure, Result, unit_of
-from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text_table import TextTable, text_table
+from tactbench.core.tables.markup import markdown
+from tactbench.core.tables.text import TextTable, text_table
 
 
 def tables(result: Result) -> str:

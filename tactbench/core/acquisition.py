@@ -1,21 +1,24 @@
-"""Acquisition of one scene on one rig, written to one recording."""
+"""Acquisition of one scene on one rig, written to one recording, and search for missing data of its devices."""
 
 from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from typing import Any
+
+import numpy as np
 
 from tactbench.core.errors import RecordingError, RigError
 from tactbench.core.interrupts import one_interrupt
 from tactbench.core.plugins.interfaces import Acquisition, RecordingRequest, Rig
-from tactbench.core.recording.completeness import INCOMPLETE, Completeness
+from tactbench.core.recording.format import Array
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block
-from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamCounts
+from tactbench.core.samples import Block, IntArray, Quality
+from tactbench.core.spec.recording import INCOMPLETE, Emulation, RecordingMeta, StreamCounts
 from tactbench.core.spec.rig_file import Allowed, RigFile
+from tactbench.core.spec.sensor import StreamSpec
 from tactbench.core.thread_limit import thread_limit
 
 
@@ -42,10 +45,8 @@ def acquire(
     clock
         Monotonic clock [s]; its difference over the scene, without writing the file, is ``provenance["sim_s"]`` of a
         simulated rig and ``provenance["acquisition_s"]`` of others.
-    opened
-        Called with the acquisition before its first block.
-    watch
-        Called with every block, once it is written.
+    opened, watch
+        Called with the acquisition before its first block, and with every block once it is written.
     complete_interrupted
         Whether an interrupted recording of a real rig is completed, excluded from every evaluation, before the error
         goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. An
@@ -55,15 +56,15 @@ def acquire(
     ------
     RigError, NotApplicable, LinkError
         If the rig cannot carry out the scene, a device sent no row, or moving parts cannot be stopped.
-    KeyboardInterrupt
-        If it was interrupted.
-    RecordingError
-        If the file cannot be written.
+    KeyboardInterrupt, RecordingError
+        If it was interrupted, or the file cannot be written.
     """
     began = clock()
     simulated = request.rig.simulated
+    if simulated:  # one thread makes the same bytes on every machine; a BLAS can be limited once it is loaded
+        importlib.import_module("scipy.linalg")
     with (
-        _one_thread() if simulated else nullcontext(),
+        thread_limit(1) if simulated else nullcontext(),
         one_interrupt() as ignore_interrupts,
         rig.open(request.sensor, request.scene, seed=request.seed) as acquisition,
     ):
@@ -108,7 +109,9 @@ def acquire(
                 lacking = ""
                 if has_devices:
                     _check_not_silent(acquisition, writer.rows)
-                    lacking = _incompleteness(acquisition, whole)
+                    ended = getattr(acquisition, "ended", "")
+                    early = [f"ended before its time: {ended}"] if ended else []
+                    lacking = "; ".join([*early, *whole.lacking(getattr(acquisition, "stream_counts", {}))])
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stop(acquisition, error)
@@ -132,13 +135,6 @@ def acquire(
     return writer.meta
 
 
-def _incompleteness(acquisition: Any, whole: Completeness) -> str:
-    """Return the reason why a recording of devices is incomplete; an empty text if it is complete."""
-    ended = str(getattr(acquisition, "ended", ""))
-    found = [f"ended before its time: {ended}"] if ended else []
-    return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
-
-
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
     """Raise RigError if no row came from the sensor, or no row from the reference."""
     for streams in (acquisition.streams, acquisition.reference):
@@ -148,12 +144,6 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
                 f"No row came from {', '.join(names)} during the whole scene.",
                 hint="Check power, cable and speed of the device; `tactbench doctor` tests its link.",
             )
-
-
-def _one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which a simulation gives identical bytes for any number of BLAS threads."""
-    importlib.import_module("scipy.linalg")  # its own BLAS can be limited once it is loaded
-    return thread_limit(1)
 
 
 def _stop(acquisition: Acquisition, error: BaseException) -> str:
@@ -233,3 +223,104 @@ def _meta(acquisition: Acquisition, request: RecordingRequest) -> RecordingMeta:
         seed=request.seed,
         **_of_devices(acquisition, request, {}),
     )
+
+
+MOVED = 0.2
+"""Share of the force's range: a sensor is frozen if its readings are constant while the force changes by more than it
+(assumed; a force sensor's noise is less, and a sensor that is not pressed need not change)."""
+
+
+class Completeness:
+    """Search for silent streams, frozen readings and lost rows in the blocks of a recording.
+
+    The force sensor is frozen if its readings are constant for longer than allowed although most of its other rows
+    differ from the row before, or if they never change while the tactile sensor's readings do. A force sensor with a
+    coarse display, which repeats readings also under load, may be constant without load.
+
+    `allowed` limits silence, time without a change, and the share of lost rows; `sensor` and `reference` are streams of
+    the tactile sensor and of the force sensor. Only streams with a stated rate are checked for silence.
+    """
+
+    def __init__(self, allowed: Allowed, sensor: Sequence[StreamSpec], reference: Sequence[StreamSpec]) -> None:
+        self._allowed = allowed
+        self._sensor = [stream.name for stream in sensor]
+        self._specs = {stream.name: stream for stream in (*sensor, *reference)}
+        self._rows: dict[str, list[IntArray]] = {name: [] for name in self._specs}
+        """Of each block, for its rows with a sample: the times of the rows [ns], the times of the rows before [ns], and
+        1 where the samples differ from those of the row before, (3, n)."""
+        self._last: dict[str, tuple[int, Array]] = {}
+        self._force: list[tuple[int, float]] = []
+        self._times_ns: list[int] = []
+
+    def add(self, block: Block) -> None:
+        """Add a block of samples; a block without times is ignored."""
+        stream, t_ns = block.stream, block.t_ns
+        if stream not in self._specs or t_ns is None or not len(t_ns):
+            return
+        self._times_ns += int(t_ns[0]), int(t_ns[-1])
+        missing = np.isnan(block.data.astype(np.float64))
+        if block.quality is not None:
+            missing |= (block.quality & np.uint8(Quality.MISSING)) != 0
+        pressing = [place for place, one in enumerate(self._specs[stream].channels) if one.name in ("fz", "normal")]
+        for place in pressing[:1] if stream not in self._sensor else ():
+            forces = block.data[~missing[:, place], place]
+            self._force += [(int(t_ns[-1]), float(forces.mean()))] if len(forces) else []
+        good = ~missing.all(axis=1)
+        if good.any():
+            data, t_ns = block.data[good], t_ns[good]
+            last_ns, last = self._last.get(stream, (t_ns[0], data[0]))
+            changed = (data != np.vstack((last, data[:-1]))).any(axis=1)
+            self._rows[stream].append(np.stack((t_ns, np.append(last_ns, t_ns[:-1]), changed)))
+            self._last[stream] = int(t_ns[-1]), data[-1].copy()
+
+    @property
+    def seconds(self) -> float:
+        """Time between the first and the last row of all streams, by their time stamps [s]."""
+        return 1e-9 * (max(self._times_ns, default=0) - min(self._times_ns, default=0))
+
+    def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:
+        """Return sentences about streams that exceed a limit; `counts` are the rig's counts of rows, by stream."""
+        return [text for name in self._specs for text in self._of(name, counts.get(name))]
+
+    def _of(self, name: str, counts: StreamCounts | None) -> Iterator[str]:
+        first_ns, last_ns = min(self._times_ns, default=0), max(self._times_ns, default=0)
+
+        def for_long(what: str, from_ns: int, to_ns: int) -> str:
+            return f"{name}: {what} for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - first_ns):.3g} s on"
+
+        edges = np.concatenate(([first_ns], self._kept(name)[0], [last_ns]))
+        place = int(np.argmax(np.diff(edges)))
+        if self._specs[name].rate_hz is not None and np.diff(edges)[place] > 1e9 * self._allowed.silent_s:
+            yield for_long("silent", edges[place], edges[place + 1])
+        # A microphone may be still in a slow press: the streams of the sensor count together.
+        kept = self._kept(*(self._sensor if name in self._sensor else [name]))
+        changes = kept[:, kept[2] == 1]
+        since, until = np.append(kept[0, :1], changes[0]), np.append(changes[1], kept[0, -1:])
+        for row in np.flatnonzero(until - since > 1e9 * self._allowed.frozen_s):
+            if self._frozen(name, changes.shape[1], since[row], until[row]):
+                yield for_long("frozen", since[row], until[row])
+                break
+        if counts is not None:
+            lost, due = counts.gaps - counts.late + counts.dropped, counts.received + counts.gaps - counts.late
+            if due and lost / due > 0.01 * self._allowed.lost_percent:
+                yield f"{name}: {lost} of {due} rows lost"
+
+    def _kept(self, *names: str) -> IntArray:
+        """Return the rows of some streams as `_rows` describes them, in order of time, (3, n)."""
+        blocks = (block for name in names for block in self._rows[name])
+        rows = np.concatenate([np.empty((3, 0), dtype=np.int64), *blocks], axis=1)
+        return rows[:, np.argsort(rows[0], kind="stable")]
+
+    def _frozen(self, name: str, changes: int, from_ns: int, to_ns: int) -> bool:
+        """Return True if a sensor is constant while the force changes, or a usually changing force sensor is."""
+        if name in self._sensor:
+            every = [value for _, value in self._force]
+            within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]
+            return bool(within) and max(within) - min(within) > MOVED * (max(every) - min(every)) > 0
+        # An axis may stand; a force that nothing changes is none.
+        if all(channel.kind != "force" for channel in self._specs[name].channels):
+            return False
+        if not changes:
+            return bool(self._kept(*self._sensor)[2].any())
+        others = self._kept(name).shape[1] * (1 - 1e-9 * (to_ns - from_ns) / self.seconds)
+        return bool(changes > others / 2)

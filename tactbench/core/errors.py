@@ -198,14 +198,8 @@ class EngineError(TactbenchError):
 class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
     """A cell or a recording was stopped without a result.
 
-    Parameters
-    ----------
-    message, hint, traceback_text
-        Message, hint and traceback, as in every error of tactbench.
-    signal
-        Number of the signal that ended the process; None: the process was not ended by a signal.
-    log
-        The last part of the output of the process.
+    `signal` is the number of the signal that ended the process (None: no signal did), and `log` the last part of the
+    output of the process.
     """
 
     spent_s: float | None = None

@@ -68,19 +68,9 @@ def replace_file(
 ) -> None:
     """Write `content` to a temporary file and rename it to `path`: readers see either the old or the new file.
 
-    Parameters
-    ----------
-    aside
-        Path of the temporary file in the same folder; None: a hidden file. After an error, it does not remain.
-    check
-        Function called with the temporary path before the renaming; its errors prevent the renaming.
-    sync
-        True: wait until the disk has stored the file.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
+    The temporary file is `aside`, in the same folder, or hidden (None); after an error, it does not remain. `check` is
+    called with its path before the renaming, which its errors prevent. With `sync`, the disk has stored the file when
+    the function returns. Raises OSError if the folder cannot be written.
     """
     aside = aside or path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:

@@ -1,4 +1,4 @@
-"""Interface for the progress of a long run, implemented by `tactbench.core.study.progress`."""
+"""Interface for the progress of a long run, implemented by `tactbench.core.study.terminal`."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from tactbench.core.errors import RigError, UsageError
 
 if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
-    from tactbench.core.spec.drive import ForceLoop
+    from tactbench.core.spec.scene import ForceLoop
 
 LATE = 1.5
 """Number of control periods after which a force sample counts as late."""

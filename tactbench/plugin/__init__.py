@@ -19,8 +19,7 @@ from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig,
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, FloatArray, Quality, StreamReadings
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
-from tactbench.core.spec.force_profiles import sine, staircase
-from tactbench.core.spec.profile import ForcePath, ForceRamp
+from tactbench.core.spec.profile import ForcePath, ForceRamp, sine, staircase
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import (

@@ -11,11 +11,10 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RigError, UnwritableError
 from tactbench.core.plugins.interfaces import RecordingRequest
-from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import PlanEntry, StreamCounts
+from tactbench.core.spec.recording import INCOMPLETE, PlanEntry, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.scene import Scene

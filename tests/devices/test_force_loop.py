@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.scene import ForceLoop
 from tactbench.devices.force_loop import ForceController
 from tactbench.plugin import RigError, UsageError, assumed
 from tactbench.plugin.devices import ForceLaw, LoopModel

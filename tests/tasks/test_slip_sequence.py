@@ -6,7 +6,7 @@ import pytest
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.tasks import slip_sequence
 from tests.core.evaluation.made import evaluated
 

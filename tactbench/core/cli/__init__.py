@@ -13,8 +13,10 @@ from typing import Any
 import click
 
 import tactbench
+from tactbench.core.errors import TactbenchError, UnknownNameError
 from tactbench.core.interrupts import Interrupted, end_alike
 from tactbench.core.on_demand import contributed
+from tactbench.core.tables.text import visible_lines
 from tactbench.core.thread_limit import keep_threads
 
 # verb -> (module in this folder, one line of help). The help stands here so that `--help` imports no verb.
@@ -56,8 +58,6 @@ class LazyGroup(click.Group):
         elif cmd_name in (others := contributed("tactbench.verbs")):
             found = others[cmd_name].load()
         else:
-            from tactbench.core.errors import UnknownNameError
-
             raise UnknownNameError("command", cmd_name, [*VERBS, *others])
         return found
 
@@ -132,9 +132,6 @@ def _discard_output() -> None:
 
 
 def _report(error: Exception) -> int:
-    from tactbench.core.errors import TactbenchError
-    from tactbench.core.tables.text import visible_lines
-
     if isinstance(error, OSError) and error.filename is None and error.strerror:
         click.echo(f"Error: The output cannot be written: {error.strerror}.", err=True)
         _discard_output()

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import click
 
-from tactbench.core.cli.grid import print_fields, print_records
-from tactbench.core.cli.options import format_option
+import tactbench
+from tactbench.core.cli.shared import format_option, print_fields, print_records
 from tactbench.core.conformance.check import CHECKS, KINDS
 from tactbench.core.conformance.run import CheckReport, plugins_named, run_checks, subjects_named
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.leaderboard.names import grouped
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import json_text
-
-_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 @click.command(name="check")
 @click.argument("name", required=False)
 @click.option("--list", "listed", is_flag=True, help="List the checks with their purpose and kinds of plugins.")
-@click.option("--recording", type=_FILE, metavar="FILE", help="Also check this recording of the sensor.")
+@click.option("--recording", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
+              help="Also check this recording of the sensor.")  # fmt: skip
 @click.option("--root", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
               help="Folder with the files of a data set. Default: the files fetched before.")  # fmt: skip
 @format_option("table", "json")
@@ -66,8 +66,6 @@ def command(
 
 
 def _plain(report: CheckReport) -> dict[str, object]:
-    import tactbench
-
     return {
         "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level,
         "kit": tactbench.__version__, "checks": [one._asdict() for one in report.outcomes],
@@ -80,8 +78,5 @@ def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
         yield "FAILED", f"{one.check}: {one.where}: {one.text}"
         if one.advice:
             yield "  do", one.advice
-    reasons: dict[str, list[str]] = {}
-    for one in report.of("skipped"):
-        reasons.setdefault(one.text, []).append(one.check)
-    for text, names in reasons.items():
-        yield "skipped", f"{f'{len(names)} checks' if len(names) > 1 else names[0]}: {text}"
+    for text, several in grouped(report.of("skipped"), lambda one: one.text).items():
+        yield "skipped", f"{f'{len(several)} checks' if len(several) > 1 else several[0].check}: {text}"

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import click
 
-from tactbench.core.cli.options import ABOVE_0, DEFAULT_FOLDER, format_option
+from tactbench.core.cli.shared import ABOVE_0, DEFAULT_FOLDER, format_option
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.formats import json_array
+from tactbench.core.leaderboard.formats import grids, json_array
 from tactbench.core.leaderboard.requirements import COLUMNS, Requirements, with_requirements
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import grids
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.study.results import is_results, opened, shown_rows
-from tactbench.core.study.shipped import shipped_rows
+from tactbench.core.study.files import is_results, opened, shipped_rows, shown_rows
 from tactbench.core.tables.terminal import remark, show
 
 _PREFERRED = "deployable"

@@ -6,15 +6,9 @@ from pathlib import Path
 
 import click
 
-from tactbench.core.cli.grid import print_records, print_tables
-from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.leaderboard.pairwise import (
-    comparisons,
-    folder_comparisons,
-    record_of,
-    tables_of,
-)
-from tactbench.core.study.results import is_results, opened, shown_rows
+from tactbench.core.cli.shared import RESULTS, format_option, print_records, print_tables
+from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, record_of, tables_of
+from tactbench.core.study.files import is_results, opened, shown_rows
 
 
 @click.command(name="compare")

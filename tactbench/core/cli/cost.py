@@ -9,22 +9,28 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import print_records, print_tables
-from tactbench.core.cli.options import JOBS, RESULTS, format_option, options
-from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-from tactbench.core.cost.precision import Skipped, diagrams, measured, precise
+from tactbench.core.cli.shared import JOBS, RESULTS, format_option, options, print_records, print_tables
+from tactbench.core.cost.knobs import (
+    Skipped,
+    diagrams,
+    measure,
+    measured,
+    precise,
+    quick_estimator,
+    settings_of,
+    simulations_of,
+)
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file, writable
 from tactbench.core.matrix.run import EngineChoice
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.report.figures.style import save, styled
+from tactbench.core.report.figures.group import save, styled
 from tactbench.core.report.figures.trade import draw_precision, trade_table, write_trade
-from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.spec.matrix import REPLICATES, MatrixSpec, TaskChoice
-from tactbench.core.study.progress import progress
-from tactbench.core.study.shipped import matrix_called
+from tactbench.core.spec.matrix import MOST_REPEATS, REPLICATES, MatrixSpec, TaskChoice
+from tactbench.core.study.files import matrix_called
+from tactbench.core.study.terminal import progress
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import json_text
 

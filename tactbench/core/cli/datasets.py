@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from tactbench.core.cli.grid import GRID_FORMATS, print_records
-from tactbench.core.cli.options import format_option
+from tactbench.core.cli.shared import GRID_FORMATS, format_option, print_records
 from tactbench.core.errors import ConfigError
 from tactbench.core.recording.datasets import cache, datasets
 from tactbench.core.tables.terminal import remark

@@ -9,13 +9,12 @@ from typing import Any, get_args
 
 import click
 
-from tactbench.core.cli.grid import field_text, print_fields
+from tactbench.core.cli.shared import field_text, print_fields
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.recording.mapping import ImportReport, import_tables
-from tactbench.core.recording.mapping.importing import import_log
+from tactbench.core.recording.mapping.importing import ImportReport, import_log, import_tables
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.yaml_file import plain_value
-from tactbench.core.study.progress import progress
+from tactbench.core.study.terminal import progress
 
 MOST_NAMED = 12
 """Largest number of findings, and of files left out, that are printed; the most severe findings come first."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import click
 
-from tactbench.core.cli.options import format_option
+from tactbench.core.cli.shared import field_text, format_option, print_fields, print_records
+from tactbench.core.recording.health import examine
+from tactbench.core.recording.partial import rescue as convert
+from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.tables.text import json_text
-
-if TYPE_CHECKING:
-    from tactbench.core.recording.reader import Recording
 
 _COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
 _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
@@ -30,11 +32,6 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
-    from tempfile import TemporaryDirectory
-
-    from tactbench.core.recording.partial import rescue as convert
-    from tactbench.core.recording.reader import open_recording
-
     if rescue is not None:
         if len(files) != 1:
             raise click.UsageError("--rescue OUT takes exactly one FILE.")
@@ -57,10 +54,6 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
 def describe(recording: Recording) -> dict[str, Any]:
     """Return the metadata, streams and findings of an open recording as plain data, without its samples."""
-    from dataclasses import asdict
-
-    from tactbench.core.recording.health import examine
-
     findings = [asdict(finding) for finding in examine(recording)]
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
@@ -91,8 +84,6 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 
 
 def _print(about: dict[str, Any]) -> None:
-    from tactbench.core.cli.grid import field_text, print_fields, print_records
-
     meta = about["meta"]
     effects = {taken: [one["effect"] + " (forced)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
                for taken in (True, False)}  # fmt: skip

@@ -9,15 +9,14 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.options import DEFAULT_FOLDER, options
+from tactbench.core.cli.shared import DEFAULT_FOLDER, options
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import DEFAULT
-from tactbench.core.leaderboard.formats import SUFFIXES, rendered
+from tactbench.core.leaderboard.formats import ALL, SUFFIXES, document, known_columns, rendered
+from tactbench.core.leaderboard.formats import best as best_of
+from tactbench.core.leaderboard.names import DEFAULT
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import ALL, document, known_columns
-from tactbench.core.leaderboard.view import best as best_of
-from tactbench.core.study.results import opened, shown_rows, table_of
+from tactbench.core.study.files import opened, shown_rows, table_of
 from tactbench.core.tables.terminal import show
 
 TABLE_FORMATS = ("table", "json", "md", "latex", "csv")

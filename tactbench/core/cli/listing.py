@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import print_fields, print_records
-from tactbench.core.cli.options import format_option
+from tactbench.core.cli.shared import format_option, print_fields, print_records
 from tactbench.core.plugins.registry import Registry, load_registry
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import json_text
@@ -46,7 +45,6 @@ def _titles(registry: Registry, family: str) -> dict[str, str]:
 
 
 def _plugins(registry: Registry, shape: str) -> None:
-
     refused = [str(error) for error in registry.refused]
     if shape == "json":
         click.echo(json_text({"plugins": [row._asdict() for row in registry.plugins], "refused": refused}, indent=1))

@@ -9,7 +9,7 @@ import click
 from tactbench.core.leaderboard.formats import write_tables
 from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store
-from tactbench.core.study.results import shown_rows, table_of
+from tactbench.core.study.files import shown_rows, table_of
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line
 

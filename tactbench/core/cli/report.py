@@ -6,14 +6,12 @@ from pathlib import Path
 
 import click
 
-from tactbench.core.cli.grid import print_tables
-from tactbench.core.cli.options import DEFAULT_FOLDER
+from tactbench.core.cli.shared import DEFAULT_FOLDER, print_tables
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.page import make_report
-from tactbench.core.report.published import published_table
-from tactbench.core.report.results import open_results
-from tactbench.core.study.progress import progress
-from tactbench.core.study.results import opened
+from tactbench.core.report.results import open_results, published_table
+from tactbench.core.study.files import opened
+from tactbench.core.study.terminal import progress
 from tactbench.core.tables.terminal import remark
 
 

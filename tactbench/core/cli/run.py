@@ -10,13 +10,13 @@ import click
 
 from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table
 from tactbench.core.cli.listing import remark_failed
-from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
-from tactbench.core.leaderboard.columns import DEFAULT
+from tactbench.core.cli.shared import JOBS, RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.leaderboard.formats import write_tables
+from tactbench.core.leaderboard.names import DEFAULT
 from tactbench.core.leaderboard.table import over_all
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
-from tactbench.core.study.results import table_of
+from tactbench.core.spec.matrix import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
+from tactbench.core.study.files import table_of
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut

@@ -7,14 +7,12 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import print_tables
-from tactbench.core.cli.options import JOBS, RESULTS, SIMULATION, format_option, options
+from tactbench.core.cli.shared import JOBS, RESULTS, SIMULATION, format_option, options, print_tables
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.bounds import MOST_REPEATS
-from tactbench.core.study.sensitivity import carry_out_sensitivity
-from tactbench.core.study.study import Study
+from tactbench.core.spec.matrix import MOST_REPEATS
+from tactbench.core.study.study import Study, carry_out_sensitivity
 from tactbench.core.tables.terminal import remark
 
 

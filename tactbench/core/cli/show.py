@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import field_text, print_fields, print_records, print_tables
-from tactbench.core.cli.options import format_option
+from tactbench.core.cli.shared import field_text, format_option, print_fields, print_records, print_tables
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import grouped
 from tactbench.core.plugins.registry import Owned, load_registry, plain
 from tactbench.core.report.datasheet import data_sheet, quantities, readings, sensor_table, table_one
 from tactbench.core.spec.rig import TaskDescriptor
 from tactbench.core.spec.row import lower_is_better
+from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TaskSpec
 from tactbench.core.tables.text import json_text
-
-if TYPE_CHECKING:
-    from tactbench.core.spec.sensor import SensorSpec
-    from tactbench.core.spec.task import TaskSpec
 
 
 @click.command(name="show")

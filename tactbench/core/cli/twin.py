@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import print_records
-from tactbench.core.cli.options import EFFECTS, format_option
+from tactbench.core.cli.shared import EFFECTS, format_option, print_records
 from tactbench.core.cost.knobs import task_score
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.names import grouped
@@ -16,8 +15,8 @@ from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.plugins.rigs import rig_context
-from tactbench.core.study.progress import progress
-from tactbench.core.study.simulation import simulation_of
+from tactbench.core.study.options import simulation_of
+from tactbench.core.study.terminal import progress
 from tactbench.core.tables.terminal import remark
 
 _SCORES = ("effects", "estimator", "metric", "unit", "score", "sim_s", "reason")

@@ -10,13 +10,12 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.grid import field_text, print_fields, print_tables
-from tactbench.core.cli.options import RESULTS, format_option
+from tactbench.core.cli.shared import RESULTS, field_text, format_option, print_fields, print_tables
 from tactbench.core.matrix.why import StoredCell, stored_cell
-from tactbench.core.report.cells import details, recording_scores
+from tactbench.core.report.results import details, recording_scores
 from tactbench.core.statistics.replicates import over_replicates
-from tactbench.core.study.progress import progress
-from tactbench.core.study.results import opened
+from tactbench.core.study.files import opened
+from tactbench.core.study.terminal import progress
 from tactbench.core.tables.text import command_line, cut, json_text, visible_lines
 
 _LINES = 15
@@ -94,7 +93,6 @@ def _again(found: StoredCell) -> dict[str, Any]:
 
 
 def _print_again(facts: dict[str, Any], _: StoredCell) -> None:
-
     texts = {**facts, "traceback": ""}
     print_fields([(name.replace("_", " "), text) for name, one in texts.items() if (text := field_text(one))])
     if facts["traceback"]:

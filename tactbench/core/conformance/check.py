@@ -34,8 +34,6 @@ HEAVY = frozenset({
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
 })  # fmt: skip
 """Packages that take tenths of a second to import, or that may be absent where plugins are listed."""
-
-
 THREAD_S = 1.0  # time for a thread to end
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
+from tactbench.core.evaluation.fitting import answers, fit
 
 Answer = Callable[[Any], Any]
 
@@ -35,8 +36,6 @@ def question(kind: str) -> list[Any]:
 
 def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *, given: Any = None) -> Answer:
     """Fit as an evaluation does, with the rehearsal's parameters by default; return a checked `predict`."""
-    from tactbench.core.evaluation.fitting import answers, fit
-
     X, y, *_ = given or question(kind)
     params = {**subject.descriptor.params, **((subject.descriptor.rehearsal or {}) if params is None else params)}
     with code_of(f"{place}where", subject):

@@ -23,16 +23,14 @@ from tactbench.core.conformance.streams import (
     times_are_right,
 )
 from tactbench.core.errors import UsageError
-from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.plugins.rigs import rig_context
+from tactbench.core.plugins.rigs import force_path, rig_context
 from tactbench.core.samples import FloatArray, Quality
 from tactbench.core.spec import units
-from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
-from tactbench.core.spec.scene import Environment, Indenter, Scene, Simulation, Slide
+from tactbench.core.spec.scene import Environment, ForceLoop, Indenter, Scene, Simulation, Slide
 from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N, EFFECT_N = 0.5, 2.0  # every sensor bears the first; effects need load

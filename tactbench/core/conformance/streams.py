@@ -14,8 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.acquisition import acquire
 from tactbench.core.conformance.check import fail
 from tactbench.core.plugins.interfaces import RecordingRequest
+from tactbench.core.recording.health import examine
+from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
@@ -53,9 +56,6 @@ def differing(one: Mapping[str, Sequence[Any]], other: Mapping[str, Sequence[Any
 
 def read_back(path: Path) -> Recorded:
     """Read a recording; raise TactbenchError if it cannot be read."""
-    from tactbench.core.recording.health import examine
-    from tactbench.core.recording.reader import open_recording
-
     with open_recording(path) as recording:
         came = {name: recording.read(name) for name in recording.stream_names}
         wrong = [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
@@ -67,8 +67,6 @@ def carried_out(
     opened: Callable[[Any], None] | None = None,
 ) -> Recorded:  # fmt: skip
     """Record a scene as `tactbench record` does, and read it back; raise any error of the rig."""
-    from tactbench.core.acquisition import acquire
-
     with TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         request = RecordingRequest(sensor, descriptor, scene, path, seed)

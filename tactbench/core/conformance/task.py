@@ -11,6 +11,9 @@ import numpy as np
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.press import MOST_N, SECONDS, WHY, first_press, tiny_scene
 from tactbench.core.errors import nearest
+from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.protocols import protocol_called, shots
+from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Role, Scene
@@ -37,9 +40,6 @@ def names_are_known(subject: Subject) -> None:
 
     Name protocols of docs/protocols.md, splits that its recordings serve, and estimators and baselines of its kind.
     """
-    from tactbench.core.evaluation.protocols import protocol_called, shots
-    from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
-
     spec = subject.spec
     missing = set(get_args(Role)) - {planned.role for planned in spec.scenes} if spec.scenes else set()
     with code_of("spec.protocols", subject):
@@ -65,8 +65,6 @@ def metric_has_its_unit(subject: Subject) -> None:
 
     For errors (rmse, mae, mean_euclidean_error), which are not converted, state the target's unit; else state 1.
     """
-    from tactbench.core.evaluation.metrics import METRICS
-
     spec = subject.spec
     metric = METRICS[spec.metric]
     if metric.kind != spec.kind:

@@ -1,18 +1,18 @@
-"""Scores and times with one setting varied after another; each setting is evaluated as a cell of a matrix."""
+"""Scores and times with one setting varied after another, and errors of a simulated rig against its times."""
 
 from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from tactbench.core.cost.precision import front
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, shots
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -21,6 +21,59 @@ from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.statistics.replicates import over_replicates
+
+P = TypeVar("P")
+SHARE = 1 / 3
+"""Share of an observable's noise below which an error changes scores little."""
+
+
+def front(points: Sequence[P], cost_of: Callable[[P], tuple[float, float]]) -> list[P]:
+    """Return the points that no other point beats in both time and error, by increasing time.
+
+    Parameters
+    ----------
+    cost_of
+        Function that returns the time and the error of a point; smaller is better for both.
+    """
+    kept: list[P] = []
+    for point in sorted(points, key=cost_of):
+        if not kept or cost_of(point)[1] < cost_of(kept[-1])[1]:
+            kept.append(point)
+    return kept
+
+
+class Skipped(NamedTuple):
+    """A setting of the simulation that is not possible for a sensor, with the reason."""
+
+    subject: str
+    label: str
+    reason: str
+
+
+def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[CostPoint | Skipped]:
+    """Carry out the jobs of a cost study; yield the measured points, and `Skipped` for jobs that are not possible."""
+    progress.begin(subject, len(study.jobs))
+    for job in study.jobs:
+        progress.working(job.label)
+        try:
+            yield from job.run()
+        except TactbenchError as error:
+            yield Skipped(subject, job.label, str(error))
+        progress.advance(job.label)
+
+
+def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoint]]:
+    """Return the points of each diagram by (subject, observable), sorted by time."""
+    found: dict[tuple[str, str], list[CostPoint]] = {}
+    for point in points:
+        found.setdefault((point.subject, point.observable), []).append(point)
+    return {key: sorted(group, key=lambda point: point.seconds) for key, group in found.items()}
+
+
+def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
+    """Return the front of a diagram: points that no other beats in both seconds and error."""
+    return front(points, lambda point: (point.seconds, point.error))
+
 
 TREES = (3, 10, 30, 100, 300)
 WINDOWS = (0, 2, 5, 10, 20, 40)

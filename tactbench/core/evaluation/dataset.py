@@ -24,12 +24,11 @@ from tactbench.core.evaluation.channels import (
     require_forward,
     slip_reference,
 )
-from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import Answers, FloatArray, IntArray, Part, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
-from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.recording import INCOMPLETE, RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
 Mask = npt.NDArray[np.bool_]

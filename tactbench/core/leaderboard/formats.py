@@ -1,25 +1,126 @@
-"""The leaderboard in all output formats, with the same digits in each."""
+"""Selection of a leaderboard's rows and columns, and its output in all formats, with the same digits in each."""
 
 from __future__ import annotations
 
 import importlib
 import io
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, SHOWN
-from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import ALL, document, grid
+from tactbench.core.leaderboard.names import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line, held_out, metric_name
+from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.spec.row import JSON_KEYS, OF_REPLICATES
+from tactbench.core.statistics.replicates import against_reference, count_range, percent
 from tactbench.core.tables import terminal
-from tactbench.core.tables.latex import latex as latex_of
-from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text import csv_text, in_a_field, json_text, visible
+from tactbench.core.tables.markup import latex as latex_of
+from tactbench.core.tables.markup import markdown
+from tactbench.core.tables.text import TextTable, csv_text, in_a_field, json_text, visible
+
+CELL, REASON = "cell", "reason"
+"""Names of the columns for cell names, and for reasons why cells did not finish."""
+ALL = (*COLUMNS, CELL)
+"""All columns that can be chosen by name."""
+_FIRST_TO_GO = (
+    "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
+    "training", "published", "delay after touch",
+)  # fmt: skip
+"""Columns to leave out on a narrow terminal, in this order; columns selected by name are never left out."""
+
+
+def known_columns(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns given by name (``place``) or by name for programs (``rank``).
+
+    Raises
+    ------
+    UnknownNameError
+        If a name is not that of a column.
+    """
+    known = {name: name for name in ALL} | {shown: name for name, shown in SHOWN.items()}
+    names = [name.strip() for name in names]
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("column", name, ALL)
+    return tuple(dict.fromkeys(known[name] for name in names))
+
+
+def document(table: Table, columns: tuple[str, ...] = DEFAULT) -> list[TextTable]:
+    """Return the tables to print: one for each block, then events."""
+    return [*grids(table, columns), *table.sections]
+
+
+def grids(table: Table, columns: tuple[str, ...] = DEFAULT) -> list[TextTable]:
+    """Return the table to print for each block."""
+    return [grid(block, columns) for block in table.blocks]
+
+
+def grid(block: Block, columns: tuple[str, ...] = DEFAULT) -> TextTable:
+    """Return the table to print for a block; columns that were chosen by name are printed though they are empty."""
+    chosen = columns not in (DEFAULT, ALL, _IN_A_PAPER)
+    # A note states why trivial answers were skipped.
+    shown = [one for one in block.lines if one.kind != "skipped" or not one.row["is_baseline"]] or list(block.lines)
+    texts = list(map(_texts, shown))
+    names = tuple(name for name in columns if name in texts[0])
+    table = TextTable(
+        block.title,
+        names,
+        tuple(tuple(one[name] for name in names) for one in texts),
+        NUMERIC - {"place"},
+        headings=headings(names, block),
+        kinds=tuple(line.kind for line in shown),
+        origin=block.origin,
+        summary=(block.setting, *block.verdict),
+        notes=block.notes,
+        first_to_go=() if chosen else _FIRST_TO_GO,
+        unbroken=frozenset({CELL}),
+    )
+    # A column of dashes shows that no answer has a place.
+    keep = ("place",) if any(one["place"] for one in texts) else ()
+    return table if chosen else table.compact(keep)
+
+
+def _texts(line: Line) -> dict[str, str]:
+    row = line.row
+    why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
+    return {**line.texts, CELL: visible(str(row["cell"])), REASON: why}
+
+
+def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
+    """Return the headings of columns, such as metric and unit for a score, and confidence level for an interval."""
+    row = block.lines[0].row
+    unit = "" if row["unit"] == "1" else visible(f" [{row['unit']}]")
+    interval = "interval"
+    results = [line.row for line in block.lines if line.kind == "result"]
+    known = [one for one in results if one["ci_low"] is not None and one.get("n_replicates")]
+    if known:
+        levels = {percent(one["n_replicates"], one.get("replicate_unit")) for one in known}
+        of = str(known[0]["replicate_unit"]) if held_out(known[0]) else "campaign"
+        over = visible(count_range([one["n_replicates"] for one in known], of))
+        interval = f"{levels.pop()} interval over {over}" if len(levels) == 1 else f"interval over {over}"
+    shown = {"score": metric_name(row), "interval": interval, "notes": ""}
+    shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(row))}
+    return tuple(shown.get(name, name) for name in names)
+
+
+def best(table: Table, count: int) -> Table:
+    """Return the table with the best `count` answers of each sensor in each block, with places among all answers."""
+    blocks = []
+    for block in table.blocks:
+        found: Counter[str] = Counter()
+        kept = []
+        for line in block.lines:
+            found[line.row["sensor"]] += line.kind == "result"
+            if line.kind == "result" and found[line.row["sensor"]] <= count:
+                kept.append(line)
+        setting = f"{block.setting} · of each sensor the first {count}, places among all"
+        blocks.append(replace(block, lines=tuple(kept), setting=setting))
+    return replace(table, blocks=tuple(block for block in blocks if block.lines))
+
 
 SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".txt": "table",
             ".parquet": "parquet", ".xlsx": "xlsx"}  # fmt: skip
@@ -30,13 +131,9 @@ _IN_A_PAPER = ("place", "sensor", "estimator", "score", "notes", "interval", "ra
 def latex(table: Table, columns: tuple[str, ...]) -> str:
     """Return the tables as LaTeX, each one column wide, with metric, protocol, split and origin in the caption."""
     names = _IN_A_PAPER if columns in (DEFAULT, ALL) else columns
-    grids = []
-    for block in table.blocks:
-        # A column of dashes shows that no answer has a place.
-        keep = ("place",) if any(line.texts["place"] for line in block.lines) else ()
-        shown = grid(block, names).compact(keep)
-        grids.append(replace(shown, title=f"{block.title} · {block.setting} · {block.origin}"))
-    return latex_of([*grids, *table.sections], wide=False)
+    titles = [f"{block.title} · {block.setting} · {block.origin}" for block in table.blocks]
+    titled = [replace(grid(block, names), title=title) for block, title in zip(table.blocks, titles, strict=True)]
+    return latex_of([*titled, *table.sections], wide=False)
 
 
 def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: int = terminal.WITHOUT_EDGE) -> bytes:
@@ -61,7 +158,7 @@ def rendered(table: Table, shape: str, columns: tuple[str, ...] = ALL, width: in
     elif shape == "latex":
         text = latex(table, columns)
     else:
-        text = csv_of(table) if shape == "csv" else json_array(table)
+        text = csv_text(*_flat(table)) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "backslashreplace")
 
 
@@ -98,13 +195,8 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
-def csv_of(table: Table) -> str:
-    """Return a table as CSV with one line for each record: all keys, and the texts shown in columns ``shown_…``."""
-    return csv_text(*_flat(table))
-
-
 def _flat(table: Table) -> tuple[list[str], list[list[Any]]]:
-    """Return the names of the columns, and the lines, with lists and mappings as JSON."""
+    """Return the names of the columns, all keys and ``shown_…``, and the lines, with lists and mappings as JSON."""
     names = [*_KEYS, *_RANKS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
     return names, [[*map(_field, row.values()), *shown.values()] for row, shown in records(table)]
 

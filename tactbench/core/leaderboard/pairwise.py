@@ -10,15 +10,11 @@ from typing import Any, Literal
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.statistics.paired import Difference, difference, holm
-from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
+from tactbench.core.tables.text import ABSENT, Entry, TextTable, finite, score, signed, suffix, text_table, visible
 
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
-COLUMNS = (
-    "of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict",
-)  # fmt: skip
+COLUMNS = ("of", "A", "B", "A − B", "95 % interval", "p", "p Holm", "n", "verdict")
 _NOTE = (
     "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
     "p: of no difference at all, by exchanging A and B within replicates; p Holm: corrected for all "

@@ -10,13 +10,12 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from tactbench.core.leaderboard.columns import Line
-from tactbench.core.leaderboard.names import Bars, Row, sensor_name
+from tactbench.core.leaderboard.names import Bars, Line, Row, sensor_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion
-from tactbench.core.tables.numbers import duration
+from tactbench.core.tables.text import duration
 
 MET, MISSED, UNKNOWN = "met", "missed", "unknown"
 """First words of the texts in a column of requirements."""

@@ -17,8 +17,7 @@ from tactbench.core.spec.scene import RANGES
 from tactbench.core.spec.sensor import PhysicalRange, SensorSpec
 from tactbench.core.statistics.paired import Difference, difference
 from tactbench.core.statistics.replicates import counted, over_replicates
-from tactbench.core.tables.numbers import ABSENT, score, signed
-from tactbench.core.tables.text_table import TextTable, text_table
+from tactbench.core.tables.text import ABSENT, TextTable, score, signed, text_table
 
 FOLDER = "assumptions"
 TURNED = "turns round"

@@ -13,8 +13,7 @@ from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, he
 from tactbench.core.spec.row import STOPPED, plural
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, against_reference, count_range, least_coverage, percent
-from tactbench.core.tables.numbers import interval, score, score_with_unit
-from tactbench.core.tables.text import cut
+from tactbench.core.tables.text import cut, interval, score, score_with_unit
 
 MOST_BELOW = 5
 MOST_NAMES = 4

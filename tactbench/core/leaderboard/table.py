@@ -2,7 +2,8 @@
 
 Comparable rows are in one block, and ranks are within a block. Rows under different tasks, protocols or
 splits, or from simulation and hardware, are not comparable. A table depends on its rows, not on their order.
-Control characters in its texts are escaped (`text.visible`); formats escape their own syntax.
+Control characters in its texts are escaped (`text.visible`); formats escape their own syntax. Last: the table
+of event detectors, and the stamp on rows whose score is mostly that of the first frame of each recording.
 """
 
 from __future__ import annotations
@@ -10,32 +11,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.columns import Line, line_of
-from tactbench.core.leaderboard.events import events_table
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe
 from tactbench.core.leaderboard.names import (
+    WORSE_END,
     Bars,
+    Line,
     Row,
+    answer_name,
     direction,
     error_of,
     grouped,
     hardware_name,
+    line_of,
     metric_name,
+    sign_of,
     split_name,
 )
-from tactbench.core.leaderboard.probe import with_leaks
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, above, below
+from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.row import LEAKS
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
-from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable, field_text
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Store
+from tactbench.core.tables.text import ABSENT, TextTable, field_text, score_with_unit, text_table, visible
 
 _Key = tuple[str, str, str, str]
 
@@ -195,3 +196,89 @@ def _may_be_placed(row: Row) -> bool:
     """Return True if a row has enough campaigns or held-out units for a place."""
     enough = (row.get("n_replicates") or 0) >= FEWEST
     return enough if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None
+
+
+LEAK_SHARE = 0.5
+"""Share of the skill (score beyond the trivial answer's) at which the first frame's skill is called a leak."""
+TAIL = 0.025
+"""Largest probability of guessing as often right as the first frame, for it to be better than a guess."""
+FEWEST_RECORDINGS = 5
+"""Smallest number of test recordings for a statement on a regression from first frames."""
+
+
+def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows, one for each cell, stamped as leaking if the first frame explains half of the skill or more."""
+    firsts = {_question(row): row for row in rows if row["protocol"] == FIRST_FRAME.name and row["status"] == "done"}
+    return [_stamped(row, firsts.get(_question(row))) for row in rows]
+
+
+def _question(row: Row) -> tuple[str, ...]:
+    return row["sensor"], row["task"], row["rig"], row["split"], answer_name(row)
+
+
+def _stamped(row: dict[str, Any], first: Row | None) -> dict[str, Any]:
+    """Return a row with a stamp if it leaks, given the row of the same question from first frames."""
+    # A split that keeps nothing apart has a stamp of its own.
+    asked = row["protocol"] == DEPLOYABLE.name and row["split"] not in ("shuffled", "in-session")
+    if first is None or row["is_baseline"] or row["status"] != "done" or not asked or row["baseline"] is None:
+        return row
+    skill, most = (sign_of(row) * (row["baseline"] - one["score"]) for one in (first, row))
+    if skill < LEAK_SHARE * most or not _beyond_guessing(first, row["baseline"]):
+        return row
+    alone, whole = (score_with_unit(one["score"], one["unit"]) for one in (first, row))
+    return {**row, "stamps": [*row["stamps"], f"{LEAKS}first frame alone {alone} of {whole}."]}
+
+
+def _beyond_guessing(first: Mapping[str, Any], trivial: float) -> bool:
+    """Return True if the first frame answers better than a guess, False also if there are too few recordings.
+
+    Classes: by the exact binomial tail of the number of right answers, one for each recording; a guess is the
+    most frequent class. Numbers: if the interval is better than the trivial score.
+    """
+    sign, table = sign_of(first), first["confusion"]
+    if table is None:
+        worst = first[WORSE_END[sign]]
+        return first["n_test"] >= FEWEST_RECORDINGS and worst is not None and sign * (trivial - worst) > 0
+    from scipy.special import bdtrc
+
+    n, right = sum(map(sum, table)), sum(line[place] for place, line in enumerate(table))
+    guess = max(map(sum, table), default=0) / max(n, 1)
+    return guess < 1.0 and right > 0 and bool(bdtrc(right - 1, n, guess) <= TAIL)
+
+
+_FIGURES = {
+    "precision": "precision", "recall": "recall", "misses": "misses", "events": "events",
+    "latency p50 [ms]": "onset latency p50 ms", "p95 [ms]": "onset latency p95 ms",
+    "false alarms/min": "false alarms per minute",
+    "compute [s/s]": "compute s per s of signal",
+}  # fmt: skip
+"""Key of the figure of merit of each column."""
+_NOTE = (
+    "Latency: from the labelled onset to the alarm, with the detector's computing time, over hits; negative is early. "
+    "Compute: computing time per second of signal."
+)
+
+
+def events_table(rows: Sequence[Row]) -> TextTable | None:
+    """Return the table of event detection from the finished rows; None if no row is of an event task."""
+    finished = [row for row in rows if row["status"] == "done" and row.get("events")]
+    if not finished:
+        return None
+    lines = []
+    for row in finished:
+        figures = row["events"]
+        values = {name: figures.get(key) for name, key in _FIGURES.items()}
+        texts = {name: ABSENT if value is None else f"{value:.3g}" for name, value in values.items()}
+        if figures.get("alarms") == 0:
+            texts["latency p50 [ms]"] = "never alarms"
+        lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
+    bound, area = (
+        " or ".join(dict.fromkeys(f"{row['events'][key]:g}" for row in finished if key in row["events"]))
+        for key in ("bound of false alarms per minute", "area up to false alarms per minute")
+    )
+    limit = f" for at most {bound} false alarms a minute" if bound else ""
+    notes = (f"Recall area: recall, averaged over false alarms a minute from 0 to {area}. " * bool(area) + _NOTE,)
+    kinds = ["baseline" if row["is_baseline"] else "result" for row in finished]
+    title = f"Events, at the threshold that validation recordings chose{limit}"
+    columns = ("task", "sensor", "estimator", *_FIGURES)
+    return text_table(title, columns, lines, numeric=_FIGURES, kinds=kinds, notes=notes)

@@ -24,12 +24,11 @@ from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_of
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.progress import Progress
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig import RigDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.task import ChannelTarget, TaskSpec, in_drawn_order
+from tactbench.core.spec.task import ChannelTarget, DeclaredTask, TaskSpec, in_drawn_order
 
 RequestKey = tuple[str, str, str | None, int]
 """Key (sensor, task, split, seed) that determines the recordings of a cell."""

@@ -12,9 +12,8 @@ from pydantic import ValidationError
 
 from tactbench.core.errors import UsageError
 from tactbench.core.plugins.registry import Family, Owned, Registry
-from tactbench.core.spec import declared_task
-from tactbench.core.spec.declared_task import FILE, DeclaredTask, TaskFile
 from tactbench.core.spec.rig import TaskDescriptor
+from tactbench.core.spec.task import TASKS_FILE, DeclaredTask, TaskFile
 from tactbench.core.spec.yaml_file import load_yaml
 
 
@@ -28,7 +27,7 @@ def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
     for below, folders, names in os.walk(folder) if folder is not None else ():
         # A folder that vanishes meanwhile, or may not be read, is passed over.
         folders[:] = [name for name in folders if not name.startswith(".")]
-        paths += [Path(below, FILE)] if FILE in names else []
+        paths += [Path(below, TASKS_FILE)] if TASKS_FILE in names else []
     for path in sorted(paths):
         for task in load_yaml(path, TaskFile).tasks:
             known, where = found.setdefault(task.name, (task, path))
@@ -49,11 +48,11 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
     for name, task in each.items():
         if name in registry.tasks:
             raise UsageError(
-                f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed task.",
+                f"The task {name!r} in {TASKS_FILE} beside the recordings has the name of an installed task.",
                 hint="Rename the task in that file, or in the mapping and import again.",
             )
         descriptor = TaskDescriptor(spec=task.spec)
-        family.add(Owned(descriptor, declared_task.__name__, "recordings", "", task.model_dump_json()))
+        family.add(Owned(descriptor, DeclaredTask.__module__, "recordings", "", task.model_dump_json()))
     return registry.with_tasks(family)
 
 

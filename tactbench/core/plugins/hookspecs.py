@@ -10,16 +10,7 @@ from collections.abc import Sequence
 
 import pluggy
 
-from tactbench.core.spec.rig import (
-    DeviceDescriptor,
-    EffectDescriptor,
-    EstimatorDescriptor,
-    IndenterDescriptor,
-    ProfileDescriptor,
-    RigDescriptor,
-    SensorDescriptor,
-    TaskDescriptor,
-)
+from tactbench.core.spec import rig
 
 GROUP = "tactbench"
 """Name of the entry-point group of plugins, and of the pluggy project."""
@@ -33,40 +24,40 @@ hookimpl = pluggy.HookimplMarker(GROUP)
 
 
 @hookspec
-def tactbench_sensors() -> Sequence[SensorDescriptor]:  # type: ignore[empty-body]
+def tactbench_sensors() -> Sequence[rig.SensorDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's sensors."""
 
 
 @hookspec
-def tactbench_rigs() -> Sequence[RigDescriptor]:  # type: ignore[empty-body]
+def tactbench_rigs() -> Sequence[rig.RigDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's rigs."""
 
 
 @hookspec
-def tactbench_devices() -> Sequence[DeviceDescriptor]:  # type: ignore[empty-body]
+def tactbench_devices() -> Sequence[rig.DeviceDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's force sensors and motors."""
 
 
 @hookspec
-def tactbench_tasks() -> Sequence[TaskDescriptor]:  # type: ignore[empty-body]
+def tactbench_tasks() -> Sequence[rig.TaskDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's tasks."""
 
 
 @hookspec
-def tactbench_estimators() -> Sequence[EstimatorDescriptor]:  # type: ignore[empty-body]
+def tactbench_estimators() -> Sequence[rig.EstimatorDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's estimators."""
 
 
 @hookspec
-def tactbench_effects() -> Sequence[EffectDescriptor]:  # type: ignore[empty-body]
+def tactbench_effects() -> Sequence[rig.EffectDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's simulation effects."""
 
 
 @hookspec
-def tactbench_indenters() -> Sequence[IndenterDescriptor]:  # type: ignore[empty-body]
+def tactbench_indenters() -> Sequence[rig.IndenterDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's indenter shapes."""
 
 
 @hookspec
-def tactbench_profiles() -> Sequence[ProfileDescriptor]:  # type: ignore[empty-body]
+def tactbench_profiles() -> Sequence[rig.ProfileDescriptor]:  # type: ignore[empty-body]
     """Return the descriptors of the plugin's force profiles."""

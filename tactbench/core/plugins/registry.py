@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cache
@@ -30,20 +30,11 @@ from tactbench.core.errors import (
     error_text,
 )
 from tactbench.core.plugins import hookspecs
-from tactbench.core.spec.rig import (
-    DeviceDescriptor,
-    EffectDescriptor,
-    EstimatorDescriptor,
-    IndenterDescriptor,
-    ProfileDescriptor,
-    RigDescriptor,
-    SensorDescriptor,
-    TaskDescriptor,
-)
+from tactbench.core.spec import rig
 
 Descriptor = (
-    SensorDescriptor | RigDescriptor | DeviceDescriptor | TaskDescriptor | EstimatorDescriptor | EffectDescriptor
-    | IndenterDescriptor | ProfileDescriptor
+    rig.SensorDescriptor | rig.RigDescriptor | rig.DeviceDescriptor | rig.TaskDescriptor | rig.EstimatorDescriptor
+    | rig.EffectDescriptor | rig.IndenterDescriptor | rig.ProfileDescriptor
 )  # fmt: skip
 D = TypeVar("D", bound=Descriptor)
 
@@ -125,17 +116,17 @@ class Registry:
     """All installed descriptors, by kind."""
 
     def __init__(self) -> None:
-        self.sensors: Family[SensorDescriptor] = Family("sensor")
-        self.rigs: Family[RigDescriptor] = Family("rig")
-        self.devices: Family[DeviceDescriptor] = Family("device")
-        self.tasks: Family[TaskDescriptor] = Family("task")
-        self.estimators: Family[EstimatorDescriptor] = Family("estimator")
-        self.effects: Family[EffectDescriptor] = Family("effect")
-        self.indenters: Family[IndenterDescriptor] = Family("indenter")
-        self.profiles: Family[ProfileDescriptor] = Family("profile")
+        self.sensors: Family[rig.SensorDescriptor] = Family("sensor")
+        self.rigs: Family[rig.RigDescriptor] = Family("rig")
+        self.devices: Family[rig.DeviceDescriptor] = Family("device")
+        self.tasks: Family[rig.TaskDescriptor] = Family("task")
+        self.estimators: Family[rig.EstimatorDescriptor] = Family("estimator")
+        self.effects: Family[rig.EffectDescriptor] = Family("effect")
+        self.indenters: Family[rig.IndenterDescriptor] = Family("indenter")
+        self.profiles: Family[rig.ProfileDescriptor] = Family("profile")
         self.plugins: list[PluginRow] = []
 
-    def with_tasks(self, tasks: Family[TaskDescriptor]) -> Registry:
+    def with_tasks(self, tasks: Family[rig.TaskDescriptor]) -> Registry:
         """Return the registry with `tasks` in place of its tasks."""
         found = copy(self)
         found.tasks = tasks
@@ -172,23 +163,18 @@ _KINDS: dict[str, type[Any]] = {
 def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = 20.0) -> Registry:
     """Load every plugin of the entry-point group, each separately from the others.
 
-    Parameters
-    ----------
-    points
-        Entry points to load instead of the installed ones.
-    timeout_s
-        Longest time that the import of a plugin and its hooks may take [s].
-
-    Returns
-    -------
-    Registry
-        The plugins that could be loaded, and a row for each plugin that could not. A bad plugin raises no error.
+    A bad plugin raises no error: it has a row in the registry. The import of a plugin and its hooks may take
+    `timeout_s` [s]; `points` are entry points to load instead of the installed ones.
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
     unique = {(point.name, point.value, _owner(point.dist)): point for point in found}
     foreign = [(point.name, point.value) for point in unique.values() if not _is_built_in(point.module)]
-    answers = _described_in_children(sorted(foreign), timeout_s)
+    answers: dict[tuple[str, str], Any] = {}
+    if foreign:
+        from tactbench.core.pool import Limits, Pool
+
+        answers = dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, sorted(foreign)))
     for (name, module, owner), point in sorted(unique.items()):
         _add(registry, point, owner, answers.get((name, module)))
     return registry
@@ -209,7 +195,10 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     try:
         if isinstance(reply, BaseException):
             raise reply
-        offered = ask_plugin(point) if reply is None else _described(reply)
+        if reply is None:
+            offered = ask_plugin(point)
+        else:
+            offered = {name: [_KINDS[name].model_validate(one) for one in several] for name, several in reply.items()}
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", error_text(error))
         reason += line_in(point.module, getattr(error, "traceback_text", ""))
@@ -229,15 +218,6 @@ def line_in(module: str, trace: str) -> str:
     return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 
-def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) -> dict[tuple[str, str], Any]:
-    """Return the descriptors of each plugin, read in a child process, or the error that prevented reading."""
-    if not points:
-        return {}
-    from tactbench.core.pool import Limits, Pool
-
-    return dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, points))
-
-
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Return the descriptors of a plugin as plain data, to be sent between processes."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
@@ -250,13 +230,9 @@ def _describe(point: tuple[str, str]) -> dict[str, Any]:
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
     """Return a descriptor as plain data, including a sensor's data sheet, which recordings and keys omit."""
     dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
-    if isinstance(descriptor, SensorDescriptor):
+    if isinstance(descriptor, rig.SensorDescriptor):
         dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
     return dumped
-
-
-def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
-    return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in reply.items()}
 
 
 def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:

@@ -1,4 +1,4 @@
-"""Building of rigs from their descriptors, rig files and effects.
+"""Building of rigs from their descriptors, rig files and effects, and of force paths from named profiles.
 
 The effects of this package are candidates for every scene; those of another package only if the sensor's descriptor or
 the scene names them, so that a package that is merely installed is not imported into a run and is in no key.
@@ -6,15 +6,19 @@ the scene names them, so that a package that is merely installed is not imported
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import RigError, TactbenchError, error_text
+from pydantic import ValidationError
+
+from tactbench.core.errors import PluginContractError, RigError, TactbenchError, complaint, error_text
 from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import Owned, Registry, load_object
-from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.profile import ForcePath
+from tactbench.core.spec.quantity import Quantity, Source
+from tactbench.core.spec.rig import EffectDescriptor, ProfileDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 
@@ -88,3 +92,28 @@ def rig_context(registry: Registry, **given: Any) -> RigContext:
         indenters=tuple(registry.indenters),
         **given,
     )
+
+
+def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by: str) -> ForcePath:
+    """Return the path of a force profile, with the parameters `given` and defaults for all others.
+
+    The path's source names `by` (the option or file that selects the profile), the profile and every parameter. Raises
+    UsageError for a parameter that is not valid, and PluginContractError if the plugin returns no force path.
+    """
+    values = descriptor.values(given)
+    what = f"The force profile {descriptor.name!r}"
+    try:
+        made = load_object(descriptor.where)(**values)
+    except ValidationError as error:
+        raise PluginContractError(
+            f"{what} gives no valid force path for {values}: {complaint(error)}.",
+            hint="Its times must ascend from 0 s, and its forces must be finite and 0 N or more.",
+        ) from error
+    if not isinstance(made, ForcePath):
+        raise PluginContractError(
+            f"{what} returned a {type(made).__name__}, and a ForcePath is expected.",
+            hint=f"Correct {descriptor.where}.",
+        )
+    listed = ", ".join(f"{name} {value:g} {descriptor.parameters[name].unit}" for name, value in values.items())
+    source = Source(tag="assumed", reference=f"{by}: force profile {descriptor.name} ({listed})")
+    return made.model_copy(update={"source": source})

@@ -75,14 +75,7 @@ def fit(device_ns: IntArray, host_ns: IntArray, stretch_ns: int = STRETCH_NS) ->
 
     Every half stretch (15 s), a line is fitted to a stretch (30 s) of times; the last line of a run is fitted to the
     rest, 0.75 to 1.25 stretches. A new run of lines begins where the device's times go back, or leap ahead by more than
-    15 s.
-
-    Parameters
-    ----------
-    device_ns, host_ns
-        (n,) times of the device and of receipt at the host [ns], in order of receipt.
-    stretch_ns
-        Length of the stretch to which one line is fitted [ns].
+    15 s. `device_ns` and `host_ns` are (n,) times of the device and of receipt at the host [ns], in order of receipt.
     """
     found: list[ClockSegment] = []
     for run, here in _runs(device_ns):

@@ -39,15 +39,10 @@ FOLDER = "datasets"
 
 @dataclass(frozen=True)
 class DataSet:
-    """A public data set: a mapping file that states the source of its files, found by the file's name.
-
-    Parameters
-    ----------
-    path
-        Path of the mapping file, whose name without ending is the data set's name.
-    """
+    """A public data set: a mapping file that states the source of its files, found by the file's name."""
 
     path: Path
+    """Path of the mapping file, whose name without ending is the data set's name."""
 
     @property
     def name(self) -> str:
@@ -83,12 +78,8 @@ class DataSet:
     def recordings(self, root: Path | None = None, progress: Progress | None = None) -> Path:
         """Return the folder of the recordings, after downloading, checking and importing missing files.
 
-        Parameters
-        ----------
-        root
-            Folder with a copy of the files, directly or in a sub-folder; without a copy, the files are downloaded.
-        progress
-            Receives a step for every file once it is present, and for every file imported.
+        Without a copy of the files in the folder `root`, or in a sub-folder of it, they are downloaded. `progress`
+        receives a step for every file once it is present, and for every file imported.
 
         Raises
         ------
@@ -149,12 +140,8 @@ def cache() -> Path:
 def datasets() -> dict[str, DataSet]:
     """Return the data sets of all installed packages, by name; mapping files without `source` are left out.
 
-    A data set with an invalid mapping file is included, and raises ConfigError when its mapping is read.
-
-    Raises
-    ------
-    DuplicateNameError
-        If two packages have data sets of the same name.
+    A data set with an invalid mapping file is included, and raises ConfigError when its mapping is read. Raises
+    DuplicateNameError if two packages have data sets of the same name.
     """
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():

@@ -49,9 +49,8 @@ def readable(path: Path) -> Iterator[None]:
     except FormatError:
         raise
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise FormatError(
-            f"{path} is damaged: {error}.", hint="Get it again from its source, or record it again."
-        ) from error
+        hint = "Get it again from its source, or record it again."
+        raise FormatError(f"{path} is damaged: {error}.", hint=hint) from error
 
 
 def piece_rows(channels: int) -> int:
@@ -73,12 +72,8 @@ def meta_text(meta: RecordingMeta) -> str:
 class ContentDigest:
     """SHA-256 of a recording's content; equal content has an equal digest in every file, machine and library version.
 
-    Parameters
-    ----------
-    text
-        The meta as stored in the file: fields that later versions of the model add must not change the digest.
-    version
-        Version of the file's format.
+    `text` is the meta as stored in the file: fields that later versions of the model add must not change the digest.
+    `version` is that of the file's format.
     """
 
     def __init__(self, text: str, version: int = VERSION) -> None:

@@ -134,11 +134,7 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
 def examine(recording: Recording) -> list[Finding]:
     """Check an open recording and return all findings, the most severe first.
 
-    Returns
-    -------
-    list of Finding
-        Errors (an evaluation would fail or be wrong), warnings (a score may be worse), infos (facts for the reader).
-        Empty list: no findings.
+    Errors: an evaluation would fail or be wrong; warnings: a score may be worse; infos: facts for the reader.
     """
     found = list(_meta_findings(recording))
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
@@ -302,15 +298,9 @@ def _lags(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
 def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:
     """Return True if a column is a monotone function of another, at most `LAG` rows early or late.
 
-    Parameters
-    ----------
-    one, other
-        (n,) numbers; NaN where there is no sample.
-    recording
-        (n,) number of each row's recording; only rows of one recording are compared. None: there is one recording.
+    `one` and `other` are (n,) numbers, NaN where there is no sample; `recording` is the number of each row's recording,
+    (n,), as only rows of one recording are compared. None: there is one recording.
 
-    Notes
-    -----
     A map is monotone if the rank correlation gamma of Goodman and Kruskal (1954) is 1 or -1: no two rows have opposite
     order. Ties do not count, so that rounding does not hide a copy; if a column has fewer than `FEWEST_VALUES` distinct
     values, the map must be linear.

@@ -32,32 +32,12 @@ def store(
 ) -> RecordingMeta:
     """Write a recording to the temporary path `aside`, check it by reading it back, and rename it to `target`.
 
-    Memory holds the compressed file, some chunks of each stream, and the times of streams with a device clock.
+    Memory holds the compressed file, some chunks of each stream, and the times of streams with a device clock. `blocks`
+    are in the order of receipt, and are iterated twice; the device's times are converted to the host's clock. With
+    `sync`, the disk has stored the file when the function returns; False suits recordings that can be made again.
 
-    Parameters
-    ----------
-    meta
-        Description of the recording; clock fits of devices are added, and the device's times are converted to the
-        host's clock.
-    blocks
-        Blocks in the order of receipt, iterated twice.
-    aside
-        Temporary path of the file until it has been read back.
-    replace
-        True: an existing file at `target` is replaced.
-    sync
-        True: wait until the disk has stored the file; False suits recordings that can be made again.
-
-    Returns
-    -------
-    RecordingMeta
-        `meta` with the clock fits.
-
-    Raises
-    ------
-    RecordingError
-        If `target` exists and `replace` is False, the file read back differs from the data, or the disk refuses to
-        write; `target` stays unchanged.
+    Return `meta` with the clock fits of devices. Raises RecordingError if `target` exists and `replace` is False, the
+    file read back differs from the data, or the disk refuses to write; `target` stays unchanged.
     """
 
     def check(written: Path) -> None:

@@ -63,21 +63,10 @@ def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int
 def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray) -> Lag | None:
     """Return the lag of a sensor's leading component behind that of a reference.
 
-    Parameters
-    ----------
-    sensor_ns, force_ns
-        (n,) and (m,) increasing times [ns], meant to be of the same clock.
-    sensor, force
-        (n, p) and (m, q) samples, all finite.
+    `sensor_ns` (n,) and `force_ns` (m,) are increasing times [ns], meant to be of the same clock; `sensor` (n, p) and
+    `force` (m, q) are finite samples. None: no lag is above a sample and four standard errors, or the force allows no
+    estimate: a slow ramp, a sine without rests.
 
-    Returns
-    -------
-    Lag or None
-        None: no lag is above a sample and four standard errors, or the force allows no estimate: a slow ramp, a sine
-        without rests.
-
-    Notes
-    -----
     Separable least squares (Golub and Pereyra 1973) in the lag and its linear change, by Gauss-Newton steps from where
     the cross-correlation is best. The error combines the jackknife over eight stretches of time and the difference
     between the two fits.

@@ -43,14 +43,9 @@ REMARK = "Rescued: the recording broke off and is not whole."
 
 
 class Partial:
-    """Writer of the journal of one attempt to make a recording; each attempt has its own file.
+    """Writer of the journal of one attempt to make a recording at `path`; each attempt has its own file.
 
-    Parameters
-    ----------
-    path
-        Path of the finished recording.
-    text
-        The meta known so far, as canonical JSON.
+    `text` is the meta known so far, as canonical JSON.
     """
 
     def __init__(self, path: Path, text: str) -> None:
@@ -60,9 +55,8 @@ class Partial:
         for attempt in itertools.count(1):  # x.h5.partial, x.h5.2.partial and so on
             self.path = path.with_name(f"{path.name}{'' if attempt == 1 else f'.{attempt}'}{PARTIAL}")
             try:
-                self._file = os.open(
-                    self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
-                )
+                flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+                self._file = os.open(self.path, flags, 0o666)
                 break
             except FileExistsError:
                 continue
@@ -134,15 +128,8 @@ def rescue(path: Path, target: Path) -> None:
     """Convert an unfinished recording into a finished one at `target`, excluded from evaluations as interrupted.
 
     The file of the unfinished recording is kept; it may still grow: the blocks present at this moment are converted.
-
-    Raises
-    ------
-    MissingRecordingError
-        If there is no such file.
-    FormatError
-        If the file is not an unfinished recording.
-    RecordingError
-        If `target` exists, or cannot be written.
+    Raises MissingRecordingError if there is no such file, FormatError if the file is not an unfinished recording, and
+    RecordingError if `target` exists, or cannot be written.
     """
     image.require_free(target)
     meta, end = _read(path)

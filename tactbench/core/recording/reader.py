@@ -36,11 +36,8 @@ class LazyStream:
 
     def __getitem__(self, rows: slice) -> StreamData:
         """Read and return only the rows of a slice; raises FormatError if the file is damaged there."""
-        read: dict[str, Any] = {
-            "t_ns": None,
-            "quality": None,
-            **{name: self._read(name, rows) for name in self._columns},
-        }
+        read: dict[str, Any] = {"t_ns": None, "quality": None}
+        read |= {name: self._read(name, rows) for name in self._columns}
         notes = {name: read.pop(_NOTE + name) for name in self.annotations}
         return StreamData(spec=self.spec, annotations=notes, **read)
 
@@ -110,10 +107,7 @@ class Recording:
     def stream(self, name: str) -> LazyStream:
         """Return the stream `name`, of which slices can be read.
 
-        Raises
-        ------
-        FormatError
-            If the recording has no such stream, or the file contradicts its own meta.
+        Raises FormatError if the recording has no such stream, or the file contradicts its own meta.
         """
         if name not in self.stream_names:
             raise FormatError(
@@ -130,16 +124,12 @@ class Recording:
         """Read a whole stream; raises FormatError if the recording has no such stream, or the file is damaged."""
         return self.stream(name)[:]
 
-    def content_digest(self) -> str:
-        """Return the content digest, computed anew from the data in the file."""
-        digest = layout.ContentDigest(self._text, self.version)
-        for name in sorted(self.stream_names):
-            self.stream(name).add_to(digest, whole=self.version < 4)
-        return digest.hexdigest()
-
     def verify(self) -> str:
         """Return the computed content digest; raises FormatError if it differs from the digest stored in the file."""
-        digest = self.content_digest()
+        content = layout.ContentDigest(self._text, self.version)
+        for name in sorted(self.stream_names):
+            self.stream(name).add_to(content, whole=self.version < 4)
+        digest = content.hexdigest()
         if digest != self._file.attrs.get("content_sha256", ""):
             raise FormatError(
                 f"{self.path} was changed or damaged: its content digest differs from the stored one.",
@@ -165,12 +155,8 @@ class UnwrittenRecording(Recording):
 def open_recording(path: Path) -> Recording:
     """Open a finished recording.
 
-    Raises
-    ------
-    MissingRecordingError
-        If there is no such file.
-    FormatError
-        If the file is not a recording, is damaged or unfinished, or was written by a newer tactbench.
+    Raises MissingRecordingError if there is no such file, and FormatError if the file is not a recording, is damaged or
+    unfinished, or was written by a newer tactbench.
     """
     import h5py
 

@@ -28,19 +28,8 @@ class RecordingWriter:
     contains all blocks so far. Leaving the context completes the recording: device times are converted to the host's
     clock, the file is written under a temporary name, read back, and renamed to `path`; only then is the journal
     removed. After an exception, or if the recording cannot be completed, the journal of a recording from devices is
-    kept, and the error names the command that converts it to a recording.
-
-    Parameters
-    ----------
-    path
-        Path of the finished recording.
-    meta
-        Description of the recording; :meth:`revise` changes it until the end.
-
-    Raises
-    ------
-    RecordingError
-        If the file exists, or the disk refuses to write.
+    kept, and the error names the command that converts it to a recording. Entering the context raises RecordingError
+    if the file exists, or the disk refuses to write.
     """
 
     def __init__(self, path: Path, meta: RecordingMeta) -> None:
@@ -82,10 +71,7 @@ class RecordingWriter:
     def complete(self) -> None:
         """Complete the recording now, as leaving the context does; for use inside the context after an exception.
 
-        Raises
-        ------
-        RecordingError
-            If the disk refuses to write; the journal is then kept, as after a crash.
+        Raises RecordingError if the disk refuses to write; the journal is then kept, as after a crash.
         """
         journal, aside = self._partial, layout.completing_path(self._partial.path)
         blocks = JournalBlocks(journal.path, None, journal.rows)
@@ -109,10 +95,7 @@ class RecordingWriter:
     def revise(self, **changes: Any) -> None:
         """Change fields of the meta that are known only later (`drawn`, `counts`, `provenance` …).
 
-        Raises
-        ------
-        RecordingError
-            If a field is unknown, a value does not fit its field, or the disk refuses to write.
+        Raises RecordingError if a field is unknown, a value does not fit its field, or the disk refuses to write.
         """
         try:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
@@ -126,14 +109,9 @@ class RecordingWriter:
     def append(self, block: Block) -> None:
         """Add `block` to its stream, and write it to the journal at once.
 
-        Raises
-        ------
-        RigError
-            If the block does not fit its stream: unknown name, wrong number of channels or of times, times in a
-            recording without a clock, readings that do not fit the stored type, a force of the reference that is NaN
-            and not marked missing.
-        RecordingError
-            If the disk refuses to write.
+        Raises RecordingError if the disk refuses to write, and RigError if the block does not fit its stream: unknown
+        name, wrong number of channels or of times, times in a recording without a clock, readings that do not fit the
+        stored type, a force of the reference that is NaN and not marked missing.
         """
         columns = stored_columns(block, self.meta, self._specs)
         has = (block.sequence is not None, block.device_ns is not None)
@@ -151,25 +129,8 @@ def write_recording(
 ) -> None:
     """Write a recording from blocks in memory that can be made again, so that no journal is needed.
 
-    Parameters
-    ----------
-    path
-        Path of the recording.
-    meta
-        The meta of the recording, to which the clock fits of devices are added.
-    blocks
-        All blocks.
-    annotations
-        Labels of rows, by stream and name.
-    replace
-        True: an existing file is replaced.
-
-    Raises
-    ------
-    RigError
-        If a block does not fit its stream.
-    RecordingError
-        If the file exists and `replace` is False, or the disk refuses to write.
+    The clock fits of devices are added to `meta`. Raises RigError if a block does not fit its stream, and
+    RecordingError if the file exists and `replace` is False, or the disk refuses to write.
     """
     specs = layout.specs_by_name(meta)
     stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
@@ -180,10 +141,7 @@ def write_recording(
 def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
     """Return the columns of `block` in their stored types; quality only if a sample is not good.
 
-    Raises
-    ------
-    RigError
-        If the block does not fit its stream, one of `specs`, as :meth:`RecordingWriter.append` lists.
+    Raises RigError if the block does not fit its stream, one of `specs`, as :meth:`RecordingWriter.append` lists.
     """
     spec = specs.get(block.stream)
     if spec is None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from tactbench.core.spec.quantity import Quantity, Source
 from tactbench.core.spec.sensor import ChannelKind, DataSheet, PhysicalRange, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text import TextTable
 
 UNKNOWN = "unknown"
 """Text for a property, such as the mass of a device, that no source states."""

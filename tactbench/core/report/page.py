@@ -15,22 +15,17 @@ from typing import NamedTuple
 import tactbench
 from tactbench.core.errors import UsageError, error_text
 from tactbench.core.files import replace_file, writable
-from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
+from tactbench.core.leaderboard.formats import REASON, grid
+from tactbench.core.leaderboard.names import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.sensitivity import sensitivity_tables
-from tactbench.core.leaderboard.view import REASON, grid
 from tactbench.core.progress import Progress
-from tactbench.core.report.cells import details
 from tactbench.core.report.datasheet import sensor_table, table_one
-from tactbench.core.report.figures.classification import confusion, embedding
-from tactbench.core.report.figures.group import Group, Sketch, groups
-from tactbench.core.report.figures.regression import prediction_against_time, residuals
-from tactbench.core.report.figures.style import save, styled
+from tactbench.core.report.figures.answers import confusion, embedding, prediction_against_time, residuals
+from tactbench.core.report.figures.group import Group, Sketch, groups, save, styled
 from tactbench.core.report.figures.trade import trade_table
-from tactbench.core.report.published import published_table, reproduce
-from tactbench.core.report.results import MOST_CELLS, Results, SavedFigure, Section
+from tactbench.core.report.results import MOST_CELLS, Results, SavedFigure, Section, details, published_table, reproduce
 from tactbench.core.spec.task import VectorTarget
-from tactbench.core.tables.text import command_line
-from tactbench.core.tables.text_table import WORDY, sort_value
+from tactbench.core.tables.text import WORDY, command_line, sort_value
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
@@ -132,7 +127,6 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("about", "Made by", about_section),
 )
 """Anchor, title and function of each section of the page."""
-
 
 FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
     "regression": (prediction_against_time, residuals),

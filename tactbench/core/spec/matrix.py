@@ -6,9 +6,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Simulation
+
+# Larger numbers in the settings of a run are typing errors, and would overflow.
+MOST_REPEATS = 1000
+"""Largest number of replicates. Each is recorded anew; the 95 % interval of the mean of this many is already within 6 %
+of their standard deviation."""
+MOST_SECONDS = 366 * 86400.0
+"""Largest time limit of a cell or a recording [s]: a year."""
+MOST_MEMORY_MB = 2**30
+"""Largest memory limit of a cell or a recording [MB of 2**20 bytes]: a pebibyte."""
 
 
 def _by_name(given: Any) -> Any:

@@ -13,6 +13,8 @@ from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 
 Scalar = str | float | int
 """Value of a label, or of another named fact about a recording."""
+INCOMPLETE = "incomplete: "
+"""Beginning of the text in the meta's field `excluded` of an incomplete recording."""
 
 
 def composed(text: str) -> str:

@@ -216,5 +216,3 @@ JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
 """Keys of a JSON row in their order."""
 OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
 """Additional keys of a row that stands for all replicates of a cell."""
-NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
-"""Keys whose values are lists or tables; in CSV and Parquet, such a value is JSON in one cell."""

@@ -1,14 +1,14 @@
-"""Specification of a task: target, features, metric, protocols and scenes."""
+"""Specification of a task: target, features, metric, protocols and scenes; tasks that a mapping declares as data."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from tactbench.core.errors import nearest
+from tactbench.core.errors import complaint, nearest
 from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
@@ -284,3 +284,70 @@ class TaskSpec(TaskFields):
     def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:
         """Return the scenes, as declared, that a rig records for `split`; None stands for the default split."""
         return self.scenes if split is None else self.campaigns.get(split, self.scenes)
+
+
+TASKS_FILE = "tasks.yaml"
+"""Name of the file beside recordings in which a mapping declares tasks, without code."""
+
+_METRICS = {
+    "number": ("rmse", "mae", "r2"), "vector": (VECTOR_METRIC,), "class": ("macro_f1", "accuracy", "balanced_accuracy"),
+}  # fmt: skip
+"""Metrics by kind of answer; the first of each kind is the default."""
+_ESTIMATORS = {"number": ("forest", "ridge"), "vector": ("forest-100", "ridge"), "class": ("forest", "logistic")}
+_BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index"), "class": ("majority", "chance")}
+
+
+class DeclaredTask(TaskFields):
+    """A task as a mapping file declares it; omitted fields follow from the target and the name."""
+
+    target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
+    answer: Literal["number", "class"] | None = None
+    """Type of a label's values: a class (default) or a number; None if the target is a channel."""
+    metric: str | None = None
+    """Name of the metric; None: the first metric that fits the target."""
+    splits: tuple[str, ...] = Field(min_length=1)
+    """Splits, the default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
+    answer_per: Literal["sample", "recording"] = "sample"
+    protocols: tuple[str, ...] = Field(default=("deployable",), min_length=1)
+    estimators: tuple[str, ...] = ()
+    """Names of estimators; empty: two estimators that fit the target."""
+    baselines: tuple[str, ...] = ()
+    """Names of trivial estimators; empty: the usual trivial estimators for the target."""
+    equivalence: float | None = Field(default=None, ge=0)
+
+    @property
+    def _answer(self) -> str:
+        if isinstance(self.target, LabelTarget):
+            return self.answer or "class"
+        return "vector" if isinstance(self.target, VectorTarget) else "number"
+
+    @model_validator(mode="after")
+    def _makes_a_task(self) -> DeclaredTask:
+        if self.answer is not None and not isinstance(self.target, LabelTarget):
+            raise ValueError("answer: give class or number for a label only; a channel is always a number")
+        if self.metric is not None and self.metric not in _METRICS[self._answer]:
+            raise ValueError(f"metrics of a {self._answer} are {', '.join(_METRICS[self._answer])}, not {self.metric}")
+        try:
+            self.spec  # noqa: B018  (a task that is not valid is refused in the file that declares it)
+        except ValidationError as error:
+            raise ValueError(complaint(error)) from error
+        return self
+
+    @property
+    def spec(self) -> TaskSpec:
+        """Return the task as the specification that a plugin would declare."""
+        answer, metric = self._answer, self.metric or _METRICS[self._answer][0]
+        unit = self.target.unit if metric in ("rmse", "mae", VECTOR_METRIC) else "1"
+        more: dict[str, Any] = {
+            "title": self.title or self.name, "question": self.question or f"What is {self.name}?", "unit": unit,
+            "kind": "classification" if answer == "class" else "regression", "metric": metric,
+            "estimators": self.estimators or _ESTIMATORS[answer], "baselines": self.baselines or _BASELINES[answer],
+        }  # fmt: skip
+        return TaskSpec.model_validate({**{key: value for key, value in self if key != "answer"}, **more})
+
+
+class TaskFile(Frozen):
+    """Content of a file of declared tasks, :data:`TASKS_FILE`."""
+
+    version: Literal[1] = 1
+    tasks: tuple[DeclaredTask, ...] = ()

@@ -7,8 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
-from tactbench.core.tables.text import visible_lines
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text import TextTable, visible_lines
 
 if TYPE_CHECKING:
     from rich.console import Console

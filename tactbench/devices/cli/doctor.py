@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import FiniteRange, format_option
+from tactbench.core.cli.shared import FiniteRange, format_option
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
 def _print(
     host: Sequence[HostItem], would: RigCheck | None, checks: Sequence[DeviceCheck], problems: Sequence[str]
 ) -> None:
-    from tactbench.core.cli.grid import print_fields, print_records, print_tables
-    from tactbench.core.tables.text_table import text_table
+    from tactbench.core.cli.shared import print_fields, print_records, print_tables
+    from tactbench.core.tables.text import text_table
 
     print_fields([("WRONG", text) for text in problems])
     print_tables([text_table(one.title, one.head, one.rows) for one in (would.tables if would else ())])

@@ -7,7 +7,7 @@ import pytest
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.plugins.declared import with_declared
 from tactbench.core.recording.datasets import datasets
-from tactbench.core.study.shipped import matrix_called, packaged_matrices
+from tactbench.core.study.files import matrix_called, packaged_matrices
 from tactbench.plugin import load_registry
 from tests.conftest import Verbs
 from tests.core.cli.terminals import computed

@@ -2,8 +2,7 @@
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
-from tactbench.core.study.sensitivity import _singles
-from tactbench.core.study.study import Study, matrix_of
+from tactbench.core.study.study import Study, _singles, matrix_of
 from tests.conftest import Verbs
 
 ASKED = ("sensitivity", "--sensor", "ideal", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--repeats",

@@ -5,14 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.knobs import measure, quick_estimator, settings_of, simulations_of
-from tactbench.core.cost.precision import Skipped, diagrams, precise
-from tactbench.core.cost.precision import measured as measured_twin
+from tactbench.core.cost.knobs import Skipped, diagrams, measure, precise, quick_estimator, settings_of, simulations_of
+from tactbench.core.cost.knobs import measured as measured_twin
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.plugins.interfaces import CostJob, CostStudy
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
-from tactbench.core.report.figures.style import styled
+from tactbench.core.report.figures.group import styled
 from tactbench.core.report.figures.trade import draw_precision, draw_trade
 from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint

@@ -13,7 +13,7 @@ import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.mapping.model import Mapping
 from tactbench.core.spec.yaml_file import load_yaml
 from tests.core.evaluation.made import evaluated

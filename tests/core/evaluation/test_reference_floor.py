@@ -7,7 +7,7 @@ from scipy import signal, stats
 from tactbench.core.evaluation.interval import ReplicateUnits
 from tactbench.core.evaluation.reference_floor import FEWEST, Floor, beyond_floor, hold_of, integrated_correlation
 from tactbench.core.samples import Answers
-from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.scene import ForceLoop
 
 from .made import evaluated, force_task, held, roles
 

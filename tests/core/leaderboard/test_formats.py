@@ -9,11 +9,10 @@ import pytest
 from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, SHOWN
-from tactbench.core.leaderboard.formats import rendered, write_tables
+from tactbench.core.leaderboard.formats import ALL, grids, rendered, write_tables
+from tactbench.core.leaderboard.names import COLUMNS, DEFAULT, SHOWN
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import ALL, grids
-from tactbench.core.tables.latex import tex
+from tactbench.core.tables.markup import tex
 
 from .rows import hostile_rows, row
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.formats import rendered
+from tactbench.core.leaderboard.names import DEFAULT
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.replicates import over_replicates
 

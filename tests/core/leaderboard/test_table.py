@@ -6,9 +6,9 @@ import random
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.columns import OF_ROWS
-from tactbench.core.leaderboard.formats import rendered
+from tactbench.core.leaderboard.formats import ALL, best, grids, known_columns, rendered
 from tactbench.core.leaderboard.names import (
+    OF_ROWS,
     answer_name,
     direction,
     hardware_name,
@@ -17,8 +17,7 @@ from tactbench.core.leaderboard.names import (
     split_name,
 )
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import ALL, best, grids, known_columns
-from tactbench.core.tables.text_table import Entry
+from tactbench.core.tables.text import Entry
 
 from .rows import hostile_rows, row
 

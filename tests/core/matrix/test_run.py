@@ -12,7 +12,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.pool import Limits
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
-from tactbench.core.study.results import shown_rows, table_of
+from tactbench.core.study.files import shown_rows, table_of
 from tests.core.cost.test_knobs import presses
 from tests.here import IN_THIS_PROCESS
 

@@ -7,7 +7,7 @@ import pytest
 from tactbench.core.errors import UsageError
 from tactbench.core.plugins.declared import declared_in, with_declared, with_declared_of
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.declared_task import FILE, DeclaredTask
+from tactbench.core.spec.task import TASKS_FILE, DeclaredTask
 
 
 def task(name, unit="mm"):
@@ -17,7 +17,7 @@ def task(name, unit="mm"):
 def write(folder, *tasks):
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps({"tasks": [one.model_dump(mode="json", exclude_unset=True) for one in tasks]})
-    (folder / FILE).write_text(text, encoding="utf-8")
+    (folder / TASKS_FILE).write_text(text, encoding="utf-8")
 
 
 def test_tasks_of_a_folder_and_of_those_below_are_found_once_and_hidden_ones_are_passed_over(tmp_path):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import PluginContractError, UsageError
-from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.rigs import force_path
 from tactbench.core.spec.quantity import assumed
 from tactbench.plugin import ForcePath, ProfileDescriptor, Source
 

@@ -11,7 +11,7 @@ import tactbench
 from tactbench.core.errors import ConfigError, MissingRecordingError, NotApplicable, UnknownNameError
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
-from tactbench.core.study.shipped import matrix_called
+from tactbench.core.study.files import matrix_called
 from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_metadata
 from tests.core.recording.mapping.made import write_mapping

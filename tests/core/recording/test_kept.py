@@ -15,7 +15,7 @@ from tests.conftest import ROOT
 def kept(version, digest):
     """Return the meta, the taxels and the force of a kept recording."""
     with open_recording(ROOT / "tests" / "recordings" / f"v{version}" / "press.h5") as recording:
-        assert recording.verify() == recording.content_digest() == digest
+        assert recording.verify() == digest
         assert recording.version == version
         return recording.meta, recording.read("taxels"), recording.read("force_torque")
 

@@ -11,7 +11,7 @@ import pytest
 from tactbench.core.errors import MissingRecordingError, RecordingError
 from tactbench.core.files import try_lock
 from tactbench.core.recording import image
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.partial import rescue
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter

@@ -11,11 +11,9 @@ from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
-from tactbench.core.report.figures import classification
-from tactbench.core.report.figures.classification import confusion
-from tactbench.core.report.figures.group import groups
-from tactbench.core.report.figures.regression import prediction_against_time
-from tactbench.core.report.figures.style import styled
+from tactbench.core.report.figures import answers
+from tactbench.core.report.figures.answers import confusion, prediction_against_time
+from tactbench.core.report.figures.group import groups, styled
 from tactbench.core.report.page import draw_figures
 from tactbench.core.report.results import open_results
 from tactbench.core.spec.matrix import MatrixSpec
@@ -54,8 +52,8 @@ def draw(folder, out):
     said = []
     out.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:  # t-SNE takes most of the time of figures
-        patch.setattr(classification, "ITERATIONS", 250)
-        patch.setattr(classification, "AT_MOST", 100)
+        patch.setattr(answers, "ITERATIONS", 250)
+        patch.setattr(answers, "AT_MOST", 100)
         return draw_figures(opened(folder), out, Progress(), said.append), said
 
 

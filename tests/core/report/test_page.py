@@ -8,9 +8,8 @@ import pytest
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report import results as sections
-from tactbench.core.report.cells import recording_scores
 from tactbench.core.report.page import answers_section, make_page
-from tactbench.core.report.results import Results, open_results
+from tactbench.core.report.results import Results, open_results, recording_scores
 
 from .html import Reader
 from .results import draw_one

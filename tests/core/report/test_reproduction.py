@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.published import published_table, reproduce
+from tactbench.core.report.results import published_table, reproduce
 from tests.core.leaderboard.rows import row
 
 REGISTRY = load_registry()

@@ -19,6 +19,6 @@ def _save(figure, to, **options):
 def unrendered():
     """Leave out rendering and encoding, and most steps of an embedding: they take most of the time of figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tactbench.core.report.figures.classification.ITERATIONS", 250)
+        patch.setattr("tactbench.core.report.figures.answers.ITERATIONS", 250)
         patch.setattr("matplotlib.figure.Figure.savefig", _save)
         yield

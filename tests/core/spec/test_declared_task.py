@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.spec.declared_task import DeclaredTask
+from tactbench.core.spec.task import DeclaredTask
 
 CHANNEL = {"source": "channel", "kind": "force", "name": "fz", "unit": "N"}
 VECTOR = {"source": "vector", "names": ["x", "y"], "unit": "mm"}

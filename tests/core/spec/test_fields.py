@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from tactbench.core import spec
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
-from tactbench.core.spec.row import FORMAT, NESTED
+from tactbench.core.spec.row import FORMAT
 from tactbench.core.spec.scene import NUISANCES, RANGES
 
 FILE = Path(__file__).parent / "fields.txt"
@@ -50,7 +50,7 @@ def declared():
     found += [f"nuisance {name}: {'.'.join(way)} in {unit}" for name, (way, unit) in NUISANCES.items()]
     found += [f"range of {name}: {one}" for name, one in RANGES.items()]
     for key, types in FORMAT.items():
-        found.append(f"row {key}: {', '.join(sorted(one.__name__ for one in types))}{', nested' * (key in NESTED)}")
+        found.append(f"row {key}: {', '.join(sorted(one.__name__ for one in types))}")
     return "\n".join([*dict.fromkeys(found), ""])
 
 

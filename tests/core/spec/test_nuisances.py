@@ -6,9 +6,8 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.errors import UsageError
-from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import NUISANCES, Scene, Simulation, Slide
+from tactbench.core.spec.scene import NUISANCES, ForceLoop, Scene, Simulation, Slide
 from tactbench.plugin import load_registry
 
 SCENE = Scene(name="a", drive=ForceLoop(), slide=Slide(speed=assumed(5.0, "mm/s", "test")))

@@ -4,7 +4,6 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.errors import UsageError
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.events import THRESHOLDS, SlipTarget, SlipThresholds
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig import Parameter
@@ -12,6 +11,7 @@ from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, RigFile
 from tactbench.core.spec.scene import Indenter, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import ChannelSpec, DataSheet, Nuisances, PhysicalRange, SensorSpec, StreamSpec
 from tactbench.core.spec.skin import SheetTable
+from tactbench.core.spec.task import DeclaredTask
 from tactbench.plugin import (
     ChannelTarget,
     EstimatorDescriptor,

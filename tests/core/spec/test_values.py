@@ -8,8 +8,7 @@ from pydantic import ValidationError
 
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.report.datasheet import OF_DEVICES
-from tactbench.core.spec import force_profiles
-from tactbench.core.spec.declared_task import DeclaredTask
+from tactbench.core.spec import profile
 from tactbench.core.spec.events import SlipTarget, nanoseconds
 from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 from tactbench.core.spec.quantity import assumed, derived, measured, sourced
@@ -18,7 +17,7 @@ from tactbench.core.spec.row import FORMAT, JSON_KEYS, OF_REPLICATES, RowModel, 
 from tactbench.core.spec.scene import RANGES, Environment, Indenter, Slide
 from tactbench.core.spec.sensor import Nuisances
 from tactbench.core.spec.skin import SheetTable
-from tactbench.core.spec.task import PlannedScene, Published, in_drawn_order
+from tactbench.core.spec.task import DeclaredTask, PlannedScene, Published, in_drawn_order
 from tactbench.plugin import (
     ChannelSpec,
     ForcePath,
@@ -100,7 +99,7 @@ def test_quantities_have_the_tag_of_their_maker_and_times_are_whole_nanoseconds(
 
 
 def test_named_profiles_without_parameters():
-    stairs, sine = force_profiles.staircase(), force_profiles.sine()
+    stairs, sine = profile.staircase(), profile.sine()
     levels = [1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0]
     assert stairs.forces_n == (0, 0, *np.repeat(levels, 2))
     assert stairs.times_s == (0, 3, *np.cumsum([0.5, 3.0] * 10) + 3)
@@ -108,9 +107,9 @@ def test_named_profiles_without_parameters():
     t = np.array(sine.times_s[2:])
     assert (len(t), t[0], t[-1]) == (641, 4.0, pytest.approx(14.0))
     np.testing.assert_allclose(sine.forces_n[2:], 2 - np.cos(2 * np.pi * (t - 4)), atol=1e-9)
-    assert force_profiles.staircase(steps=1, dwell=0, hold=0, rise=1e-3, rate=1).samples == 1
-    assert min(force_profiles.sine(mean=1, amplitude=1).forces_n[2:]) == 0
-    assert force_profiles.staircase(steps=1, hold=0).times_s[:2] == (0, 0.5)
+    assert profile.staircase(steps=1, dwell=0, hold=0, rise=1e-3, rate=1).samples == 1
+    assert min(profile.sine(mean=1, amplitude=1).forces_n[2:]) == 0
+    assert profile.staircase(steps=1, hold=0).times_s[:2] == (0, 0.5)
 
 
 def test_bare_names_in_a_matrix_are_lists_and_choices():

@@ -9,12 +9,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.tables.html import html
-from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.numbers import delay, duration, interval, score, score_with_unit, signed, whole
+from tactbench.core.tables.markup import html, markdown
 from tactbench.core.tables.terminal import plain_text
-from tactbench.core.tables.text import command_line, cut, json_text, visible
-from tactbench.core.tables.text_table import Entry, TextTable, field_text, finite, records_table, sort_value, text_table
+from tactbench.core.tables.text import (
+    Entry,
+    TextTable,
+    command_line,
+    cut,
+    delay,
+    duration,
+    field_text,
+    finite,
+    interval,
+    json_text,
+    records_table,
+    score,
+    score_with_unit,
+    signed,
+    sort_value,
+    text_table,
+    visible,
+    whole,
+)
 
 
 def test_only_a_bare_finite_number_is_sorted_as_one_since_lines_may_have_several_units():

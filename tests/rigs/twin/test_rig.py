@@ -8,8 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from tactbench.core.spec.drive import ForceLoop
-from tactbench.core.spec.scene import NUISANCES, Simulation
+from tactbench.core.spec.scene import NUISANCES, ForceLoop, Simulation
 from tactbench.plugin import (
     ForceRamp,
     Indenter,

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.scene import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.rigs.twin.preparation import MOST_SAMPLES, check_numbers
 from tests.rigs.twin.conftest import TWIN, q

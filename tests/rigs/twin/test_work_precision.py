@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from tactbench.core.cost.precision import Skipped, measured
+from tactbench.core.cost.knobs import Skipped, measured
 from tactbench.core.progress import Progress
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor

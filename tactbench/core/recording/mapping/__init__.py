@@ -4,7 +4,3 @@
 and ``formats`` read tables. ``channels`` names the channels, ``samples`` converts cells into samples with a quality
 each, and ``importing`` writes the recordings.
 """
-
-from tactbench.core.recording.mapping.importing import Imported, ImportReport, import_tables
-
-__all__ = ["ImportReport", "Imported", "import_tables"]

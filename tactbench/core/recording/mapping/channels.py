@@ -77,10 +77,7 @@ def expand(text: Scalar) -> Iterator[Scalar]:
 def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, dict[str, MappedStream]]:
     """Return the sensor, and all streams with their columns; ``{word}`` in the sensor's name is not replaced yet.
 
-    Raises
-    ------
-    MappingError
-        If names collide, or columns and names differ in number.
+    Raises MappingError if names collide, or columns and names differ in number.
     """
     streams: dict[str, MappedStream] = {}
     try:

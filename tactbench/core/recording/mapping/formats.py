@@ -114,12 +114,8 @@ def extra(name: str, shown: str, *modules: str) -> list[Any]:
 def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, Table]]:
     """Yield the table of each recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
-    `known` are the words in the file's path, which replace ``{word}`` in the names of further files.
-
-    Raises
-    ------
-    MappingError
-        If the file has another format or lacks an array, or an array has the wrong shape or type.
+    `known` are the words in the file's path, which replace ``{word}`` in the names of further files. Raises
+    MappingError if the file has another format or lacks an array, or an array has the wrong shape or type.
     """
     hint = "Store plain arrays (numpy.save, numpy.savez, -v7 of MATLAB); pickled objects are refused."
     with whole(shown, f"file of `format: {how.format}`", hint):
@@ -175,10 +171,7 @@ def _shaped(values: Array, axes: int) -> Array:
 def read_sheet(path: Path, shown: str, how: Xlsx) -> Table:
     """Return the table in one sheet of a workbook, with the values that Excel has stored for its formulas.
 
-    Raises
-    ------
-    MappingError
-        If openpyxl is not installed, the file is no workbook, or the sheet is missing or empty.
+    Raises MappingError if openpyxl is not installed, the file is no workbook, or the sheet is missing or empty.
     """
     (openpyxl,) = extra("xlsx", shown, "openpyxl")
     hint = "Open it and save the sheet as CSV."
@@ -214,11 +207,8 @@ def _text(value: Any) -> str:
 def read_parquet(path: Path, shown: str, used: Used) -> Table:
     """Return the table of the `used` columns; lists of equal length become columns ``name.0``, ``name.1`` ...
 
-    Raises
-    ------
-    MappingError
-        If pyarrow is not installed, the file is damaged or empty, lacks a column, lists differ in length, or there are
-        no numbers where numbers are expected.
+    Raises MappingError if pyarrow is not installed, the file is damaged or empty, lacks a column, lists differ in
+    length, or there are no numbers where numbers are expected.
     """
     arrow, parquet, compute = extra("parquet", shown, "pyarrow", "pyarrow.parquet", "pyarrow.compute")
     wanted = {part for column in map(str, used) for part in (column, column.rpartition(".")[0])}
@@ -254,11 +244,8 @@ def read_parquet(path: Path, shown: str, used: Used) -> Table:
 def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, Table]:
     """Return a table for each of `topics`, by name, read in one pass through an MCAP bag.
 
-    Raises
-    ------
-    MappingError
-        If the extra is missing, the bag is damaged or cut short or has no such topic, messages lack a field, or the
-        mapping gives another unit for a time in nanoseconds.
+    Raises MappingError if the extra is missing, the bag is damaged or cut short or has no such topic, messages lack a
+    field, or the mapping gives another unit for a time in nanoseconds.
     """
     values: dict[str, dict[Column, Any]] = {
         name: {column: array("d") if is_reading else [] for column, is_reading in used.items()}

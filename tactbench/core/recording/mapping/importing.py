@@ -42,11 +42,11 @@ from tactbench.core.recording.mapping.samples import compare_clocks, samples, ti
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest, open_recording
 from tactbench.core.recording.writer import write_recording
 from tactbench.core.samples import Block, Quality, StreamData
-from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TASKS_FILE
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
@@ -104,10 +104,8 @@ def import_tables(
 
     Parameters
     ----------
-    mapping
-        The mapping file.
-    root
-        Folder of the data set; None is the folder of the mapping file.
+    mapping, root
+        The mapping file, and the folder of the data set; None is the folder of the mapping file.
     out
         Folder for the recordings. After an error, no recording is placed there.
     progress
@@ -118,12 +116,10 @@ def import_tables(
 
     Raises
     ------
-    ConfigError
-        If the mapping file is not valid; the message names the line.
+    ConfigError, UnwritableError
+        If the mapping file is not valid (the message names the line), or `out` cannot be written.
     MappingError
         If a table does not fit the mapping; the message names file, line and column where there are any.
-    UnwritableError
-        If `out` cannot be written.
     """
     loaded = load_yaml(mapping, Mapping)
     sensor, streams = sensor_of(loaded)
@@ -149,7 +145,7 @@ def import_tables(
                     )
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
             progress.advance(next(iter(files.files.values())).shown)
-        target = out / FILE
+        target = out / TASKS_FILE
         if tasks and not replace and target.exists() and target.read_text(encoding="utf-8") != tasks:
             raise MappingError(f"{target} exists already and declares other tasks.", hint=_OTHERWISE)
         _write_tasks(folder, tasks)
@@ -172,30 +168,14 @@ def import_log(
     labels: AnyMapping[str, Scalar],
     replace: bool,
 ) -> ImportReport:
-    """Convert a log file of a sensor's own tools into a recording; after an error, no recording is written.
+    """Convert a log file of a sensor's own tools into a recording at `out`; after an error, none is written.
 
-    Parameters
-    ----------
-    log
-        The log file, in a format that the sensor's log reader supports.
-    options
-        Options of the log reader, by name.
-    out
-        The recording.
-    session, role, labels
-        As the fields of :class:`~tactbench.core.spec.recording.RecordingMeta`.
-    replace
-        True: an existing file at `out` is replaced.
+    `options` are those of the sensor's log reader, by name; `session`, `role` and `labels` are fields of
+    :class:`~tactbench.core.spec.recording.RecordingMeta`. With `replace`, an existing file at `out` is replaced.
 
-    Raises
-    ------
-    MissingRecordingError
-        If there is no such log.
-    UsageError
-        If the sensor has no reader for logs, the file is no such log, an option is not known, or `out` is no name for a
-        recording.
-    RecordingError
-        If `out` exists or cannot be written.
+    Raises MissingRecordingError if there is no such log, UsageError if the sensor has no reader for logs, the file is
+    no such log, an option is not known or `out` is no name for a recording, and RecordingError if `out` exists or
+    cannot be written.
     """
     if sensor.log_reader is None:
         raise UsageError(
@@ -249,8 +229,8 @@ def _tasks_text(mapping: Mapping) -> str:
 
 def _write_tasks(folder: Path, text: str) -> None:
     if text:
-        with writable(folder / FILE):
-            (folder / FILE).write_text(text, encoding="utf-8")
+        with writable(folder / TASKS_FILE):
+            (folder / TASKS_FILE).write_text(text, encoding="utf-8")
 
 
 @contextmanager

@@ -11,10 +11,10 @@ from pydantic import Field, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import ChannelKind
+from tactbench.core.spec.task import DeclaredTask
 
 Column = int | str
 """A column is given by its place, counted from 0, or by its name in the header."""

@@ -38,12 +38,8 @@ FIRST, LAST = "1971-01-01", "2200-01-01"
 def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[StreamData, list[Finding]]:
     """Return a recording's stream, made of a table and its clock, and findings about values that are no readings.
 
-    Cells without a sample become NaN, or 0 in a stream of whole numbers, and are marked as missing.
-
-    Raises
-    ------
-    MappingError
-        If a column is missing, a cell is no number, a channel has no sample at all, or a label is not known.
+    Cells without a sample become NaN, or 0 in a stream of whole numbers, and are marked as missing. Raises MappingError
+    if a column is missing, a cell is no number, a channel has no sample at all, or a label is not known.
     """
     stored = np.column_stack([table.numbers(channel.column) for channel in stream.channels])
     for column, channel in zip(stored.T, stream.channels, strict=True):
@@ -75,10 +71,7 @@ def samples(stream: MappedStream, table: Table, t_ns: IntArray | None) -> tuple[
 def times(table: Table, time: Time) -> IntArray:
     """Return the times of a table's rows, (n,) [ns].
 
-    Raises
-    ------
-    MappingError
-        If a cell is no time, or times since 1970 lie in an impossible year.
+    Raises MappingError if a cell is no time, or times since 1970 lie in an impossible year.
     """
     stamps, unit = table.nanoseconds(time), nanoseconds_per(time)
     if time.wraps_at is not None:
@@ -128,10 +121,7 @@ def translations(values: dict[Scalar, str]) -> dict[str, str]:
 def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str, IntArray]) -> Iterator[Finding]:
     """Compare the clocks of joined tables; yield a finding for each difference between tables joined by clock.
 
-    Raises
-    ------
-    MappingError
-        If times of one row differ by more than the mapping allows, or clocks have no time in common.
+    Raises MappingError if times of one row differ by more than the mapping allows, or clocks have no time in common.
     """
     if mapping.join is None or len(clocks) < 2:
         return

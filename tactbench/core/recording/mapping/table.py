@@ -228,13 +228,7 @@ def _since_1970(date: re.Match[str], time: Time) -> int:
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> Table:
-    """Read a table from a text file.
-
-    Raises
-    ------
-    MappingError
-        If the file cannot be read, is empty, or has rows of different lengths.
-    """
+    """Read a table from a text file; raises MappingError if it is no text, is empty, or has rows of unequal lengths."""
     content = path.read_bytes()
     try:
         text = content.decode("utf-8-sig")

@@ -1,24 +1,70 @@
-"""Groups of cells that share a figure and differ only in their sensor, with heading and caption of the figure."""
+"""Style of all figures, and groups of cells that share a figure and differ only in their sensor."""
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from operator import itemgetter
+from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tactbench.core.leaderboard.names import answer_name, error_of, grouped, hardware_name
-from tactbench.core.matrix.store import Row
-from tactbench.core.report.published import stands_beside
-from tactbench.core.report.results import Results
+from tactbench.core.files import replace_file
+from tactbench.core.leaderboard.names import Row, answer_name, error_of, grouped, hardware_name
+from tactbench.core.report.results import Results, stands_beside
 from tactbench.core.samples import Answers
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+MARKERS = "os^DvPX*<>"
+"""Markers of categories; their colours ``C0`` … are Okabe and Ito's."""
+
+
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which figures have the style of the file ``paper.mplstyle``."""
+    import matplotlib.style
+
+    return matplotlib.style.context(Path(__file__).with_name("paper.mplstyle"), after_reset=True)
+
+
+def save(figure: Figure, place: Path) -> Path:
+    """Write ``PLACE.png`` and ``PLACE.pdf`` and return the path of the PNG; equal figures give equal bytes."""
+    # Without dates, and without the version of what drew it.
+    apart = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None}}
+    for ending, metadata in apart.items():
+        content = io.BytesIO()
+        figure.savefig(content, format=ending, metadata=metadata)
+        figure.set_layout_engine("none")  # the first drawing has put everything in its place
+        replace_file(place.with_name(f"{place.name}.{ending}"), content.getvalue())
+    return place.with_name(f"{place.name}.png")
+
+
+def panels(rows: int, columns: int, *, wide: bool = False, **more: Any) -> tuple[Figure, Any]:
+    """Return a figure and its (rows, columns) axes, square, over one column of a page or over both if `wide`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(layout="constrained")
+    width = figure.get_figwidth() * (2 if wide else 1)
+    figure.set_size_inches(width, width * rows / columns)
+    return figure, figure.subplots(rows, columns, squeeze=False, **more)
+
+
+def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
+    """Add a legend below a figure, with each label of its panels listed once."""
+    entries: dict[str, Any] = {}
+    for here in shown:
+        handles, labels = here.get_legend_handles_labels()
+        entries.update(zip(labels, handles, strict=True))
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=6, **more)
+
 
 _LINE = 64
 """Largest number of characters of a line of a heading above a figure of one column."""

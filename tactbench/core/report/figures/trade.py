@@ -7,15 +7,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.cost.knobs import TIMES
-from tactbench.core.cost.precision import SHARE, diagrams
+from tactbench.core.cost.knobs import SHARE, TIMES, diagrams
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import direction, grouped, metric_name
 from tactbench.core.plugins.interfaces import CostPoint
-from tactbench.core.report.figures.style import MARKERS, legend, panels, save, styled
-from tactbench.core.tables.numbers import delay, duration, interval, score
-from tactbench.core.tables.text import json_text, visible
-from tactbench.core.tables.text_table import Entry, TextTable, text_table
+from tactbench.core.report.figures.group import MARKERS, legend, panels, save, styled
+from tactbench.core.tables.text import (
+    Entry,
+    TextTable,
+    delay,
+    duration,
+    interval,
+    json_text,
+    score,
+    text_table,
+    visible,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

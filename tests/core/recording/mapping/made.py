@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.reader import open_recording
 
 BASE = """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.reader import open_recording
 
 from .made import write_mapping

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from tactbench.core.recording.mapping import model
 from tactbench.core.recording.mapping.channels import sensor_of
-from tactbench.core.spec import declared_task
+from tactbench.core.spec.task import DeclaredTask
 from tactbench.core.spec.yaml_file import load_yaml
 from tests.conftest import ROOT
 
@@ -31,7 +31,7 @@ def test_an_example(path):
 
 def test_every_key_is_explained():
     """A key that the page does not mention is a key that nobody will find."""
-    models = [one for where in (model, declared_task) for one in vars(where).values()
-              if isinstance(one, type) and issubclass(one, BaseModel) and one.__module__ == where.__name__]  # fmt: skip
-    keys = {name for one in models for name in one.model_fields}
+    models = [one for one in vars(model).values()
+              if isinstance(one, type) and issubclass(one, BaseModel) and one.__module__ == model.__name__]  # fmt: skip
+    keys = {name for one in (*models, DeclaredTask) for name in one.model_fields}
     assert [name for name in sorted(keys) if not re.search(rf"\b{name}\b", PAGE)] == []

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.scene import ForceLoop
 from tactbench.plugin import ForceRamp, Scene
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.planner import plan_scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.scene import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, Scene
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, force_at_depth

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tactbench.core.recording.completeness import Completeness
+from tactbench.core.acquisition import Completeness
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig_file import Allowed
