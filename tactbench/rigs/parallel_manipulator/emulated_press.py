@@ -32,10 +32,7 @@ BEYOND_M = 1.0
 def quiet(scene: Scene) -> Scene:
     """Return the scene to simulate: the load follows the force profile exactly, without a filter of the force.
 
-    Raises
-    ------
-    NotApplicable
-        If the scene slides, presses nothing or does not begin at 0 N: its recording then lacks some of the forces.
+    Raises NotApplicable if it slides, presses nothing or does not begin at 0 N: its recording lacks some forces then.
     """
     profile = scene.profile
     if scene.slide is not None:
@@ -111,10 +108,7 @@ class EmulatedPress:
 class PressEmulators(RigEmulators):
     """Emulators of a rig file's devices, with all its sensors: the motor moves, sensor and force sensor respond.
 
-    Raises
-    ------
-    UsageError
-        If the rig file lacks a device or a setting.
+    Raises UsageError if the rig file lacks a device or a setting.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:

@@ -346,10 +346,8 @@ def _disarm(session: Session) -> None:
 def build(context: RigContext) -> ParallelManipulator:
     """Build the rig `parallel-manipulator`.
 
-    Raises
-    ------
-    UsageError
-        If there is no rig file, or it is incomplete or refused by `doctor`, or its `physics` is not a simulation.
+    Raises UsageError if there is no rig file, if it is incomplete or refused by `doctor`, or if its `physics` is not a
+    simulation.
     """
     if context.rig_file is None:
         raise UsageError(

@@ -32,10 +32,10 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     Command,
     CommandReader,
     Configuration,
+    FaulhaberOptions,
     OperationStatus,
     line_time_s,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 Load = Callable[[float], float]
 """Function from the position [m] to the force against positive motion [N], which is not negative and does not fall."""
@@ -185,13 +185,7 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Execute a command; return the drive's answer.
-
-        Raises
-        ------
-        Refused
-            If the drive does not execute the command; the message is the drive's answer.
-        """
+        """Execute a command; return the drive's answer. Raises Refused, with the answer, if it is not executed."""
         name, number = command.name, command.argument or 0
         if command.argument is None and (found := self._queried(name)) is not None:
             return found
@@ -271,17 +265,9 @@ class MotorFault(Fault):
 
 
 class MotorEmulator(DeviceEmulator):
-    """Emulated drive with its motor, and the speed of its serial line.
+    """Emulated drive with its motor, and the speed of its serial line; its `faults` may be changed at any time.
 
-    Attributes
-    ----------
-    faults
-        Faults of the drive; may be changed at any time.
-
-    Raises
-    ------
-    UsageError
-        For unknown options or faults.
+    Raises UsageError for unknown options or faults.
     """
 
     def __init__(self, settings: EmulatorSettings) -> None:
