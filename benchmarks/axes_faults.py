@@ -33,9 +33,9 @@ from tactbench.plugin.devices import (
     LocalGuard,
     largest_force_n,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.net_ft.driver import NetFtDriver
 
 RAILS = ("joint-1", "joint-2", "joint-3")
 WAY_M, POINTS = 1e-3, 8

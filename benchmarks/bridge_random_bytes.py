@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.links.spi_bridge import Frame, FrameDecoder, Kind, encode_frame
+from tactbench.links.spi_link import Frame, FrameDecoder, Kind, encode_frame
 
 PIECE = 1000
 

@@ -34,11 +34,10 @@ from tactbench.plugin.devices import (
     Limits,
     LocalGuard,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import AXES
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.net_ft.driver import AXES, NetFtDriver
+from tactbench.rigs.parallel_manipulator.net_ft.emulator import DatagramFault, RdtEmulator
 
 RETREAT_M, SKIN_M = -5e-3, 0.0
 """The motor stands at the first when it is switched on; the spring begins at the second."""

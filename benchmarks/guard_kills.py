@@ -28,8 +28,8 @@ import guard_faults as faults
 
 from tactbench.plugin import TactbenchError
 from tactbench.plugin.devices import DeviceSettings, GuardLostError, GuardProcess, ProcessSettings
+from tactbench.rigs.parallel_manipulator.motor.codec import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 PACKAGE = "tactbench.rigs.parallel_manipulator"
 PERIODS_S = {115200: 10e-3, 9600: 30e-3}
@@ -147,7 +147,7 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
         log = Path(folder) / "guard.log"
         settings = ProcessSettings(
             {"motor": DeviceSettings(f"{PACKAGE}.motor.driver:FaulhaberDriver", addresses["motor"], options["motor"])},
-            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:NetFtDriver", addresses["force"], options["force"]),
+            DeviceSettings(f"{PACKAGE}.net_ft.driver:NetFtDriver", addresses["force"], options["force"]),
             str(log),
         )
         given = {"setting": asdict(setting), "process": asdict(settings), "sibling": scenario.sibling}

@@ -14,15 +14,15 @@ import time
 import numpy as np
 
 from tactbench.plugin.devices import EmulatorSettings
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader
+from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
+from tactbench.rigs.parallel_manipulator.net_ft.driver import (
     Command,
     decode_records,
     encode_record,
     encode_request,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import RdtEmulator
-from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
+from tactbench.rigs.parallel_manipulator.net_ft.emulator import RdtEmulator
 
 CHUNK = 1000
 COUNTS = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}

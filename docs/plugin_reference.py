@@ -23,9 +23,9 @@ RIG_FILES = {
     "Every rig file": ("tactbench.core.spec.rig_file",),
     "Options of the BioTac": ("tactbench.sensors.biotac.frames",),
     "Options of the iCub fingertip": ("tactbench.sensors.icub.options",),
-    "Options of net-ft": (f"{_MANIPULATOR}.force_torque.net_ft.codec",),
+    "Options of net-ft": (f"{_MANIPULATOR}.net_ft.driver",),
     "Options of every axis": ("tactbench.devices.positioner",),
-    "Options of faulhaber, beside those of every axis": (f"{_MANIPULATOR}.motor.profile",),
+    "Options of faulhaber, beside those of every axis": (f"{_MANIPULATOR}.motor.codec",),
     "Settings of parallel-manipulator": (f"{_MANIPULATOR}.settings", f"{_MANIPULATOR}.kinematics"),
 }
 """Chapters of ``rig-files.md`` and the modules whose models they describe."""

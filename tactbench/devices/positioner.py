@@ -17,8 +17,7 @@ from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tactbench.devices.driver import Driver, DriverSettings, Options
 from tactbench.links.address import read_options
-from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Link
+from tactbench.links.link import ByteLink, Link
 
 SILENT_S = 0.5
 """Timeout for an answer of a controller [s] (assumed)."""

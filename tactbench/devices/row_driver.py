@@ -14,9 +14,8 @@ from tactbench.core.errors import LinkError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanLink
-from tactbench.links.datagram_link import DatagramLink
+from tactbench.links.link import ByteLink, DatagramLink
 
 L = TypeVar("L", ByteLink, CanLink, DatagramLink)
 

@@ -128,10 +128,9 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     LinkError
         If the link cannot be opened.
     """
-    from tactbench.links.byte_link import SerialLink
     from tactbench.links.can_link import CanBus
-    from tactbench.links.datagram_link import UdpLink
-    from tactbench.links.spi_bridge import SpiBridge
+    from tactbench.links.link import SerialLink, UdpLink
+    from tactbench.links.spi_link import SpiBridge
 
     kind, target, options = parse_address(address)
     match kind:

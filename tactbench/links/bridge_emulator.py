@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
+from tactbench.links.spi_link import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
 Exchange = Callable[[int, bytes, float], bytes]
 """Function of a device on the bus: select mask, bytes sent, time of their beginning [s] -> as many bytes received."""

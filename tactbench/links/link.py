@@ -1,15 +1,21 @@
-"""Base class of all links, which are open when made, closed once, and have a named error for each kind of failure."""
+"""Links for byte streams and datagrams, and the base class of all links.
+
+A link is open when made, closed once, and has a named error for each kind of failure.
+"""
 
 from __future__ import annotations
 
 import errno
+import io
 import math
+import selectors
+import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 
@@ -20,12 +26,19 @@ try:
 except ImportError:  # Windows has none
     SYSTEM_ERRORS = (OSError,)
 """Error classes of the system; `termios.error` is no OSError, and comes through pyserial when a port disappears."""
+_NOT_OPENED: tuple[type[Exception], ...] = (*SYSTEM_ERRORS, ValueError)  # pyserial's own are OSErrors
 
 Clock = Callable[[], int]
 """Function that returns the nanoseconds of a clock that never goes back, like :func:`time.monotonic_ns`."""
 
 WRITE_TIMEOUT_S = 1.0
 """Longest wait until the other end takes written data [s] (assumed; 9600 baud carry 960 bytes in 1 s)."""
+
+LARGEST_DATAGRAM = 65507
+"""Largest payload [bytes]: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
+BUFFER_BYTES = 4 << 20
+"""Requested size of the system's buffer [bytes]; the real one may be smaller. The usual 212 992 hold 256 datagrams of
+36 bytes, a quarter of a second at 1 kHz (measured on Linux); datagrams that do not fit are lost without an error."""
 
 MOST_AT_ONCE = 4096
 """Largest number of pieces that :meth:`Link.receive_all` returns, 4 s at 1 kHz, even if a bus is never idle."""
@@ -173,3 +186,188 @@ def cannot_open(address: str, error: BaseException, *, hint: str = "") -> LinkEr
     reason = os_error_in(error)
     number = reason.errno if reason is not None and reason.errno is not None else 0
     return LinkError(f"{address} cannot be opened: {error}.", hint=hint or _HINTS.get(number, "Check its address."))
+
+
+class ByteLink(Link):
+    """Link for a byte stream in both directions: a :class:`SerialLink`, or the link of an emulated device."""
+
+    silence_hint = f"{Link.silence_hint} Many boards start anew when their port is opened (DTR), and need some seconds."
+
+    def receive(self, timeout_s: float) -> Received:
+        """Return all bytes received, like :meth:`read`."""
+        return self.read(timeout_s)
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> Received:
+        """Wait for the first byte and return all bytes received; raises the errors of every :class:`Link`."""
+
+    @abstractmethod
+    def write(self, data: bytes) -> None:
+        """Send all bytes of `data`; raises the errors of every :class:`Link`."""
+
+
+class SerialLink(ByteLink):
+    """A byte stream opened by pyserial: a serial port, a pseudo-terminal or a TCP socket.
+
+    Parameters
+    ----------
+    port
+        A device (``/dev/ttyUSB0``, ``COM3``) or a URL of pyserial (``socket://host:port``, ``spy:///dev/ttyUSB0``,
+        ``loop://``). A device is opened exclusively.
+    baud
+        Bits per second, start and stop bits included.
+    parity, stop_bits
+        Parity and number of stop bits of each byte, which has eight data bits.
+    clock
+        Function that returns the times of receipt [ns].
+
+    Raises
+    ------
+    LinkError
+        If the port cannot be opened.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        *,
+        baud: int = 115200,
+        parity: Literal["none", "even", "odd"] = "none",
+        stop_bits: int = 1,
+        clock: Clock = time.monotonic_ns,
+    ) -> None:
+        import serial
+
+        super().__init__(port, clock)
+        try:
+            self._port = serial.serial_for_url(
+                port,
+                baudrate=baud,
+                parity=parity[0].upper(),
+                stopbits=stop_bits,
+                timeout=0,
+                write_timeout=WRITE_TIMEOUT_S,
+                exclusive=True,
+            )
+        except _NOT_OPENED as error:
+            raise cannot_open(port, error) from error
+        # Waiting for the file descriptor gives the earliest stamp, and does not touch the port's settings: pyserial
+        # sets all of them anew for each change of its timeout. Windows' ports and loop have no descriptor.
+        self._ready: selectors.BaseSelector | None = None
+        try:
+            descriptor = self._port.fileno()
+        except (io.UnsupportedOperation, AttributeError):
+            return
+        self._ready = selectors.DefaultSelector()
+        self._ready.register(descriptor, selectors.EVENT_READ)
+
+    def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
+        deadline = self._usable(timeout_s)
+        left_s = timeout_s
+        try:
+            while True:
+                if self._ready is None:
+                    self._port.timeout = left_s
+                    data = self._port.read(1)
+                    t_ns = self._clock()
+                    if data:
+                        data += self._port.read(self._port.in_waiting)
+                else:
+                    self._ready.select(left_s)
+                    t_ns = self._clock()
+                    data = self._port.read(65536)
+                if data:
+                    return Received(data, t_ns)
+                left_s = deadline - self.timer()
+                if left_s <= 0:
+                    raise self._nothing_came(timeout_s)
+        except SYSTEM_ERRORS as error:
+            raise self._unplugged(error) from error
+
+    def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
+        from serial import SerialTimeoutException
+
+        self._usable()
+        try:
+            self._port.write(data)
+        except SerialTimeoutException as error:
+            raise self._not_sent(error) from error
+        except SYSTEM_ERRORS as error:
+            raise self._unplugged(error) from error
+
+    def _release(self) -> None:
+        if self._ready is not None:
+            self._ready.close()
+        inner = getattr(self._port, "_socket", None)
+        with suppress(*SYSTEM_ERRORS):
+            self._port.close()
+        if inner is not None:  # pyserial forgets to close a socket that the other end has reset
+            inner.close()
+
+
+class DatagramLink(Link):
+    """Link for datagrams to and from one peer: a :class:`UdpLink`, or the link of an emulated device."""
+
+    @abstractmethod
+    def receive(self, timeout_s: float) -> Received:
+        """Return the next datagram, whole; raises the errors of every :class:`Link`.
+
+        Raises LinkUnplugged if the peer's host reports that its port is closed.
+        """
+
+    @abstractmethod
+    def send(self, data: bytes) -> None:
+        """Send one datagram; raises the errors of every :class:`Link`."""
+
+
+class UdpLink(DatagramLink):
+    """Datagrams to and from one peer over UDP; datagrams from other hosts are not received.
+
+    Parameters
+    ----------
+    host, port
+        Host name or address of the peer, and its UDP port.
+    clock
+        Function that returns the times of receipt [ns].
+
+    Raises
+    ------
+    LinkError
+        If no address is found for the host.
+    """
+
+    def __init__(self, host: str, port: int, *, clock: Clock = time.monotonic_ns) -> None:
+        super().__init__(f"udp://{f'[{host}]' if ':' in host else host}:{port}", clock)
+        try:
+            family, kind, protocol, _, peer = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            with ExitStack() as opening:
+                self._socket = opening.enter_context(socket.socket(family, kind, protocol))
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+                self._socket.connect(peer)
+                opening.pop_all()
+        except OSError as error:
+            raise cannot_open(self.address, error) from error
+
+    def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
+        self._usable(timeout_s)
+        try:
+            self._socket.settimeout(timeout_s)
+            data = self._socket.recv(LARGEST_DATAGRAM)
+            return Received(data, self._clock())
+        except (TimeoutError, BlockingIOError):
+            raise self._nothing_came(timeout_s) from None
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def send(self, data: bytes) -> None:  # noqa: D102  (inherited)
+        self._sendable(data)
+        try:
+            self._socket.settimeout(WRITE_TIMEOUT_S)
+            self._socket.send(data)
+        except TimeoutError as error:
+            raise self._not_sent(error) from error
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def _release(self) -> None:
+        self._socket.close()

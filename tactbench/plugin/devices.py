@@ -62,12 +62,9 @@ if TYPE_CHECKING:
     )
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link, read_options
-    from tactbench.links.byte_link import ByteLink
     from tactbench.links.can_link import CanFrame, CanLink, read_can_log
-    from tactbench.links.datagram_link import DatagramLink
-    from tactbench.links.link import Clock, Link, Received
-    from tactbench.links.spi_bridge import SpiBridge
-    from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
+    from tactbench.links.link import ByteLink, Clock, DatagramLink, Link, Received
+    from tactbench.links.spi_link import SpiBridge, SpiLink, SpiReply, SpiStep
 
 __all__ = [
     "FORCE",

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.links.byte_link import SerialLink
-from tactbench.links.spi_bridge import HELLO, SETUP, Frame, FrameDecoder, Kind, encode_frame
+from tactbench.links.link import SerialLink
+from tactbench.links.spi_link import HELLO, SETUP, Frame, FrameDecoder, Kind, encode_frame
 from tactbench.plugin.devices import LinkError, LinkTimeout, SpiBridge, SpiStep
 from tests.links.ends import loopback, pty, serving
 

@@ -9,7 +9,7 @@ import threading
 import can
 import pytest
 
-from tactbench.links.byte_link import SerialLink
+from tactbench.links.link import SerialLink
 from tactbench.plugin.devices import CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
 from tests.links.ends import pty
 

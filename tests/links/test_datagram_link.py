@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from tactbench.links.datagram_link import UdpLink
+from tactbench.links.link import UdpLink
 from tactbench.plugin.devices import LinkTimeout
 
 

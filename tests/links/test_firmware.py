@@ -11,10 +11,8 @@ from itertools import pairwise
 import pytest
 
 from tactbench.core.errors import LinkTimeout
-from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Link, Received
-from tactbench.links.spi_bridge import Frame, FrameDecoder, Kind, SpiBridge, encode_frame
-from tactbench.links.spi_link import SpiStep
+from tactbench.links.link import ByteLink, Link, Received
+from tactbench.links.spi_link import Frame, FrameDecoder, Kind, SpiBridge, SpiStep, encode_frame
 from tests.conftest import ROOT
 
 STUB = ROOT / "tests" / "links" / "arduino"

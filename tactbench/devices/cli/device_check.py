@@ -15,8 +15,7 @@ from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.devices.rig_devices import descriptor_of, open_driver
 from tactbench.devices.sequence import SequenceCheck
-from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Clock
+from tactbench.links.link import ByteLink, Clock
 
 READ_S = 0.25
 """Longest wait of one read of a driver [s]."""

@@ -18,7 +18,7 @@ from tactbench.devices.emulation.line import Line, Piece
 from tactbench.devices.emulation.virtual_time import SPI_HZ, EmulatedDevice
 from tactbench.devices.emulator import DeviceEmulator, Sent
 from tactbench.links.can_link import CanFrame
-from tactbench.links.datagram_link import LARGEST_DATAGRAM
+from tactbench.links.link import LARGEST_DATAGRAM
 
 STOP_S = 0.05
 """Longest wait of a server without events [s], after which it checks for a request to end."""

@@ -14,11 +14,9 @@ from tactbench.core.spec.rig import EmulatedLink
 from tactbench.devices.emulation.line import Line, LinkFault, Piece
 from tactbench.devices.emulator import DeviceEmulator, SpiDeviceEmulator
 from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanFrame, CanLink
-from tactbench.links.datagram_link import DatagramLink
-from tactbench.links.link import Link, Received
-from tactbench.links.spi_bridge import SpiBridge
+from tactbench.links.link import ByteLink, DatagramLink, Link, Received
+from tactbench.links.spi_link import SpiBridge
 
 SPI_HZ = 4_400_000
 """Clock of an emulated SPI bus [Hz]: that of the BioTac maker's own tools [sourced: docs/links.md]; the bus takes up

@@ -172,10 +172,7 @@ class Bench(Rig):
 def build(context: RigContext) -> Bench:
     """Build the rig `bench`.
 
-    Raises
-    ------
-    UsageError
-        If there is no rig file, or its `physics` is not a simulation, or it has devices that the bench does not open.
+    Raises UsageError if there is no rig file, its `physics` is no simulation, or the bench does not open its devices.
     """
     if context.rig_file is None:
         raise UsageError(

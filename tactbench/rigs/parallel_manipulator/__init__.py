@@ -21,8 +21,8 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             name="net-ft",
             title="ATI force-torque sensor behind a Net F/T box, by UDP",
             kind="force",
-            driver=f"{here}.force_torque.net_ft.driver:NetFtDriver",
-            emulator=f"{here}.force_torque.net_ft.emulator:RdtEmulator",
+            driver=f"{here}.net_ft.driver:NetFtDriver",
+            emulator=f"{here}.net_ft.emulator:RdtEmulator",
             emulated_link="datagram",
             # Usual counts (sourced: netft/pyNetFT).
             emulated_options={"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6},

@@ -32,10 +32,7 @@ BEYOND_M = 1.0
 def quiet(scene: Scene) -> Scene:
     """Return the scene to simulate: the load follows the force profile exactly, without a filter of the force.
 
-    Raises
-    ------
-    NotApplicable
-        If the scene slides, presses nothing or does not begin at 0 N: its recording then lacks some of the forces.
+    Raises NotApplicable if it slides, presses nothing or does not begin at 0 N: its recording lacks some forces then.
     """
     profile = scene.profile
     if scene.slide is not None:
@@ -50,7 +47,7 @@ def quiet(scene: Scene) -> Scene:
 class EmulatedPress:
     """A simulated sensor, pressed by an emulated motor.
 
-    Without load, the sensor repeats the readings of the recording's unloaded hold, from :meth:`start` on.
+    Without load, the sensor repeats the readings of the recording's unloaded hold, from `start_s` on.
 
     Parameters
     ----------
@@ -71,7 +68,8 @@ class EmulatedPress:
     ) -> None:
         profile = scene.profile
         self.skin_m = skin_m
-        self._start_s = 0.0
+        self.start_s = 0.0
+        """Begin of the scene on the devices' clock [s]."""
         self._hold_s, self._duration_s = profile.hold_s, profile.duration.to("s")
         self._s_per_n = (self._duration_s - self._hold_s) / profile.corners[1][-1]
         self._corners = profile.corners
@@ -86,10 +84,6 @@ class EmulatedPress:
         self._samples.start(0.0)
         self._rng = rng
 
-    def start(self, at_s: float) -> None:
-        """Let the scene's time begin at `at_s` of the devices' clock [s]."""
-        self._start_s = at_s
-
     def force_n(self, position_m: float) -> float:
         """Return the force of the skin [N] at a position of the motor, as its drive counts [m]."""
         return float(np.interp(position_m, *self._curve)) if position_m > self.skin_m else 0.0
@@ -98,7 +92,7 @@ class EmulatedPress:
         """Return every channel's value, in its unit, at a time of the devices' clock [s] and a motor's position [m]."""
         force_n = self.force_n(position_m)
         last_s = self._duration_s - 1e-9  # the sample at the end of the scene is one without load
-        since_s = min((t_s - self._start_s) % self._duration_s, last_s)
+        since_s = min((t_s - self.start_s) % self._duration_s, last_s)
         load_n = float(np.interp(since_s, *self._corners))
         noise_n = self._samples(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
@@ -111,10 +105,7 @@ class EmulatedPress:
 class PressEmulators(RigEmulators):
     """Emulators of a rig file's devices, with all its sensors: the motor moves, sensor and force sensor respond.
 
-    Raises
-    ------
-    UsageError
-        If the rig file lacks a device or a setting.
+    Raises UsageError if the rig file lacks a device or a setting.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
@@ -144,9 +135,9 @@ class PressEmulators(RigEmulators):
         self.press = EmulatedPress(press, scene, skin_m=skin_m, largest_n=largest_n, rng=rng)
 
     def begin(self, at_s: float) -> None:
-        """Let the scene's time begin, see :meth:`EmulatedPress.start`."""
+        """Let the scene's time begin at `at_s` of the devices' clock [s]."""
         if self.press is not None:
-            self.press.start(at_s)
+            self.press.start_s = at_s
 
     def _sensed(self, t_s: float) -> Mapping[str, float]:
         position_m = -math.inf if self._motor is None else self._motor.position_m

@@ -179,13 +179,8 @@ def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, Floa
 def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     """Return the (..., 3) places [m] at joint values (..., 3) [m].
 
-    Raises
-    ------
-    ClosureError
-        If the links do not meet (with measured joints, a lost step or a wrong geometry), or the joint centres lie in
-        one line.
-    UsageError
-        If a joint value is not finite.
+    Raises UsageError if a joint value is not finite, and ClosureError if the links do not meet (with measured joints, a
+    lost step or a wrong geometry), or the joint centres lie in one line.
     """
     centre = delta.centre_m(_finite(q))
     L, c1 = delta.link_m, centre[..., 0, :]
@@ -288,10 +283,7 @@ def way(
 ) -> list[Place]:
     """Return the places [m] of a path: up to the clearance, sideways, then down to the stand-off above `xy_m`.
 
-    Raises
-    ------
-    PlaceRefusedError
-        If a move of the path is not permitted; nothing has moved.
+    Raises PlaceRefusedError if a move of the path is not permitted; nothing has moved.
     """
     top_m = max(here_m[2], clearance_m)
     places: list[Place] = [here_m, (*here_m[:2], top_m), (*xy_m, top_m), (*xy_m, stand_off_m)]

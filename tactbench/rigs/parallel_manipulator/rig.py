@@ -156,7 +156,7 @@ class ParallelManipulator(Rig):
 
     Guard and homes are kept between scenes: in real time the session with them begins with the first scene and ends
     with this object or an error. In virtual time each scene has its own session, so that a recording does not depend on
-    earlier scenes.
+    earlier scenes. Raises UsageError if settings are missing or contradict each other.
 
     Parameters
     ----------
@@ -167,11 +167,6 @@ class ParallelManipulator(Rig):
         Access to the person who mounts the caps; not needed if all devices are emulated.
     physics
         Simulation of the scenes for emulated devices.
-
-    Raises
-    ------
-    UsageError
-        If the settings lack a value or contradict each other. :func:`build` refuses the same files as `doctor`.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics) -> None:
@@ -346,10 +341,8 @@ def _disarm(session: Session) -> None:
 def build(context: RigContext) -> ParallelManipulator:
     """Build the rig `parallel-manipulator`.
 
-    Raises
-    ------
-    UsageError
-        If there is no rig file, or it is incomplete or refused by `doctor`, or its `physics` is not a simulation.
+    Raises UsageError if there is no rig file, if it is incomplete or refused by `doctor`, or if its `physics` is not a
+    simulation.
     """
     if context.rig_file is None:
         raise UsageError(

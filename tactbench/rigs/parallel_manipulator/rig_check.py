@@ -26,10 +26,7 @@ _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_un
 def check(file: RigFile) -> RigCheck:
     """Return tables of the largest forces of axes and force loop, and the problems for which the file is refused.
 
-    Raises
-    ------
-    UsageError, UnknownNameError
-        If the file lacks a value, has one that a drive does not support, or a device in it is not installed.
+    Raises UsageError if the file lacks a value, has one that a drive does not support, or names an unknown device.
     """
     registry = load_registry()
     file, settings = with_limits(file, registry)

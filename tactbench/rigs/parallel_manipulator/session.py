@@ -49,7 +49,8 @@ class Session:
 
     Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time,
     all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their home as
-    long as drive and session live.
+    long as drive and session live. Raises LinkError, RigError or UsageError if a link cannot be opened, or a device
+    does not answer or is not as stated.
 
     Parameters
     ----------
@@ -62,11 +63,6 @@ class Session:
     ----------
     checked
         Result of the check of the force sensor by a push; empty: not yet checked.
-
-    Raises
-    ------
-    LinkError, RigError, UsageError
-        If a link cannot be opened, or a device does not answer or is not as stated.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
@@ -158,7 +154,9 @@ class Session:
 
         The place is None without a platform. Before, an operator confirms that the indenter is clear of the sensor if
         this is not known, and the force sensor is checked once. The guard is armed meanwhile: it monitors the force,
-        with the ceiling of travel, and can stop all rails.
+        with the ceiling of travel, and can stop all rails. Raises
+        RigError if the force of a push is read wrong, the path is not permitted, the guard stopped the move, or the
+        platform is not at its target.
 
         Parameters
         ----------
@@ -166,12 +164,6 @@ class Session:
             Target of the platform, x and y [m].
         ask
             Function that prompts an operator, see :func:`ask_operator`.
-
-        Raises
-        ------
-        RigError
-            If the force of a push is read wrong, the path is not permitted, the guard has stopped the move, or the
-            platform is not at its target.
         """
         guard, delta, heights = self.guard, self.settings.manipulator, self.settings.heights
         if unclear := guard.disarm().unclear:  # of the scene before, if that ended in a fault

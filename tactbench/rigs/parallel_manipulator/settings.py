@@ -328,10 +328,7 @@ def axis_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Position
 def with_limits(file: RigFile, registry: Any) -> tuple[RigFile, RigSettings]:
     """Return the rig file with the limits of its settings added to the motor's options, and the settings.
 
-    Raises
-    ------
-    UsageError
-        As in :func:`settings_of`, and if the motor's options state a limit a second time, or the limits are not valid.
+    Raises UsageError as :func:`settings_of`, and if the motor's options state a limit again, or the limits are invalid.
     """
     settings, entry = settings_of(file), file.devices[MOTOR]
     limits, touch = settings.limits, settings.touch

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
+from tactbench.rigs.parallel_manipulator.net_ft.driver import NetFtDriver
 
 
 class NanDriver(NetFtDriver):

@@ -21,7 +21,7 @@ def load(name):
 
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
-NET_FT = f"{PACKAGE}.force_torque.net_ft.driver:NetFtDriver"
+NET_FT = f"{PACKAGE}.net_ft.driver:NetFtDriver"
 # In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
 # answer of the motor, too, whose driver is told of a slow line.
 PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "setpoint_n": 2.0}

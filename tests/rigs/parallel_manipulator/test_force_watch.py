@@ -5,7 +5,7 @@ import numpy as np
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Trigger
 from tactbench.plugin import Block
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
+from tactbench.rigs.parallel_manipulator.net_ft.driver import NetFtOptions
 from tests.rigs.parallel_manipulator.presses import FAULTS
 
 LIMITS = FAULTS.Setting().limits

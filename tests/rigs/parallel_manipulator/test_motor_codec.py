@@ -11,12 +11,12 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     LONGEST_LINE,
     Command,
     CommandReader,
+    FaulhaberOptions,
     Kind,
     Line,
     LineReader,
     encode,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 # Commands as the drive reads them; all are answered OK.
 ANSWERED_OK = {

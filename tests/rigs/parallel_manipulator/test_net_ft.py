@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.plugin import Quality, RigError, UsageError
 from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeout, LinkUnplugged
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+from tactbench.rigs.parallel_manipulator.net_ft.driver import (
     AXES,
     Command,
+    NetFtDriver,
     NetFtOptions,
     decode_records,
     decode_request,
@@ -18,8 +19,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     encode_request,
     quality,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
+from tactbench.rigs.parallel_manipulator.net_ft.emulator import DatagramFault, RdtEmulator
 from tests.rigs.parallel_manipulator.pumps import VirtualLink, read_for
 
 REQUESTS = [

@@ -17,9 +17,15 @@ from tactbench.plugin.devices import (
     PositionerSilentError,
     PositionerState,
 )
-from tactbench.rigs.parallel_manipulator.motor.codec import Configuration, Line, OperationStatus, encode, line_time_s
+from tactbench.rigs.parallel_manipulator.motor.codec import (
+    Configuration,
+    FaulhaberOptions,
+    Line,
+    OperationStatus,
+    encode,
+    line_time_s,
+)
 from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 CORRIDOR_M = 0.2e-3
 """Largest distance [m] of target and position when the motor is switched on, and of position and `home_m` after homing
@@ -35,7 +41,6 @@ STANDING_NS = 20_000_000
 
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
-_CHANGED = "Check if the drive was without power or set by another program, and the option against its manual."
 
 _ENDS = ("GPL", "GNL")
 """Queries of the ends of travel, which are set by homing."""
@@ -83,10 +88,7 @@ class FaulhaberDriver(Positioner):
     def facts_of(cls, options: FaulhaberOptions) -> PositionerFacts:
         """Return the axis' properties, with the drive's increment, and the latency of line and motor.
 
-        Raises
-        ------
-        RigError
-            For a setting that the drive does not support.
+        Raises RigError for a setting that the drive does not support.
         """
         _stated(options)
         bytes_ahead = LONGEST_AHEAD + len(retreat_command(options))
@@ -337,7 +339,10 @@ class FaulhaberDriver(Positioner):
 
     def _same(self, query: str, command: str, argument: int) -> None:
         if (found := self._sure(query)) != argument:
-            raise PositionerError(f"The drive has {query} {found} after {command}{argument} was set.", hint=_CHANGED)
+            raise PositionerError(
+                f"The drive has {query} {found} after {command}{argument} was set.",
+                hint="Check if it was without power or set by another program, and the option against its manual.",
+            )
 
     # Polling ----------------------------------------------------------------------------------------------------------
 

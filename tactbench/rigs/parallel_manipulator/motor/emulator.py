@@ -32,10 +32,10 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     Command,
     CommandReader,
     Configuration,
+    FaulhaberOptions,
     OperationStatus,
     line_time_s,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 Load = Callable[[float], float]
 """Function from the position [m] to the force against positive motion [N], which is not negative and does not fall."""
@@ -59,10 +59,6 @@ _READ_BACK = {
     "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GPL": "GPL",
     "GNL": "GNL",
 }  # fmt: skip
-
-
-class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
-    """The drive does not execute a command; the message is its answer."""
 
 
 class Motion:
@@ -185,25 +181,19 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Execute a command; return the drive's answer.
-
-        Raises
-        ------
-        Refused
-            If the drive does not execute the command; the message is the drive's answer.
-        """
+        """Execute a command; return the drive's answer, of a command that it does not execute its refusal."""
         name, number = command.name, command.argument or 0
         if command.argument is None and (found := self._queried(name)) is not None:
             return found
         if number < 0 and name not in _SIGNED:
-            raise Refused(INVALID_PARAMETER)
+            return INVALID_PARAMETER
         if name in ("M", "V") and not self.enabled:
-            raise Refused(OVERTEMPERATURE if self.hot else NOT_AVAILABLE)  # Assumed.
+            return OVERTEMPERATURE if self.hot else NOT_AVAILABLE  # Assumed.
         speed_unit, rate = self._options.speed_unit_m_s, self._options.acceleration_unit_m_s2 * self.settings["DEC"]
         match name:
             case "EN":
                 if self.hot:
-                    raise Refused(OVERTEMPERATURE)
+                    return OVERTEMPERATURE
                 if not self.enabled:
                     # A motor switched on stays where it is.
                     self.enabled, self._at_speed = True, False
@@ -229,12 +219,12 @@ class Drive:
                 self._origin_m = self.position_m - self._options.position_m(number)
             case "LL":
                 if number == 0:
-                    raise Refused(INVALID_PARAMETER)  # Assumed: zero has no sign that picks a limit.
+                    return INVALID_PARAMETER  # Assumed: zero has no sign that picks a limit.
                 self.settings["GPL" if number > 0 else "GNL"] = number
             case _ if name in self.settings:
                 self.settings[name] = number
             case _:
-                raise Refused(UNKNOWN_COMMAND)
+                return UNKNOWN_COMMAND
         return OK
 
     def _queried(self, name: str) -> str | None:
@@ -271,17 +261,9 @@ class MotorFault(Fault):
 
 
 class MotorEmulator(DeviceEmulator):
-    """Emulated drive with its motor, and the speed of its serial line.
+    """Emulated drive with its motor, and the speed of its serial line; its `faults` may be changed at any time.
 
-    Attributes
-    ----------
-    faults
-        Faults of the drive; may be changed at any time.
-
-    Raises
-    ------
-    UsageError
-        For unknown options or faults.
+    Raises UsageError for unknown options or faults.
     """
 
     def __init__(self, settings: EmulatorSettings) -> None:
@@ -324,11 +306,7 @@ class MotorEmulator(DeviceEmulator):
             at_s, part = self._in.popleft()
             self._go_to(at_s)
             for command in self._reader.feed(part):
-                try:
-                    answer = self.drive.answer(command)
-                except Refused as refusal:
-                    answer = str(refusal)
-                self._send(answer, at_s + ANSWER_S)
+                self._send(self.drive.answer(command), at_s + ANSWER_S)
         self._go_to(now_s)
         found: list[Sent] = []
         while self._out and self._out[0][0] <= now_s:

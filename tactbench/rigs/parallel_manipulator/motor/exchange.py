@@ -12,10 +12,16 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerError, PositionerSilentError
-from tactbench.rigs.parallel_manipulator.motor.codec import LONGEST_ANSWER, Kind, Line, LineReader, encode, line_time_s
+from tactbench.rigs.parallel_manipulator.motor.codec import (
+    LONGEST_ANSWER,
+    MARK,
+    Kind,
+    Line,
+    LineReader,
+    encode,
+    line_time_s,
+)
 
-MARK = "VER"
-"""Query with a known answer, the drive's version."""
 IN_A_ROW = 3
 """Number of successive lost answers after which the drive counts as silent (assumed)."""
 HOST_S = 0.15
@@ -88,14 +94,8 @@ class Exchange:
     def pump(self, timeout_s: float) -> Answer | None:
         """Read lines, waiting at most `timeout_s` for the first byte; return the outcome of the query, if known.
 
-        Raises
-        ------
-        MotorRefusalError
-            If the drive refuses a command.
-        PositionerSilentError
-            If three successive answers were lost.
-        LinkUnplugged
-            If the link is gone.
+        Raises MotorRefusalError if the drive refuses a command, PositionerSilentError if three successive answers were
+        lost, and LinkUnplugged if the link is gone.
         """
         due_ns = self._since_ns + round(1e9 * self.answer_s * (3 if self._marking else 1))
         wait_s = timeout_s if self.ready else min(timeout_s, max(0.0, (due_ns - self._clock()) * 1e-9))
@@ -120,10 +120,7 @@ class Exchange:
     def greet(self) -> str:
         """Find the drive: end a partial command on its line, and read its version twice.
 
-        Raises
-        ------
-        LinkTimeout
-            If the drive does not answer, or not twice the same.
+        Raises LinkTimeout if the drive does not answer, or not twice the same.
         """
         self._link.write(b"\r")
         self.quiet()

@@ -1,7 +1,4 @@
-"""Emulator of a Net F/T box: answers requests with datagrams, without input or output, at times passed in.
-
-A :class:`tactbench.plugin.devices.DeviceEmulator`.
-"""
+"""Emulator of a Net F/T box: answers requests with datagrams, without input or output, at times passed in."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from tactbench.plugin.devices import (
     fault_concerns,
     read_options,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+from tactbench.rigs.parallel_manipulator.net_ft.driver import (
     AXES,
     ERROR_SUMMARY,
     SATURATION,
@@ -52,15 +49,7 @@ LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
 class RdtEmulator(DeviceEmulator):
     """A box with its sensor, which reads fx, fy, fz [N], tx, ty, tz [N*m] of `settings.senses`; others are 0.
 
-    Attributes
-    ----------
-    faults
-        Faults of the box; may be changed at any time.
-
-    Raises
-    ------
-    UsageError
-        For unknown options or faults.
+    Its `faults` may be changed at any time. Raises UsageError for unknown options or faults.
     """
 
     def __init__(self, settings: EmulatorSettings) -> None:
