@@ -13,8 +13,8 @@ import numpy as np
 
 from tactbench.core.samples import Block, FloatArray, Quality
 from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import SequenceCheck
 from tactbench.devices.guard_messages import Limits, Trigger
-from tactbench.devices.sequence import SequenceCheck
 
 DELAY_WINDOW_NS = 1_000_000_000
 """Half of the time over which the least delay of a device's samples is determined [ns] (assumed: clocks that differ by
