@@ -57,13 +57,12 @@ def rig_files() -> str:
 def _door(door: str) -> Iterator[str]:
     """Yield a door's chapter: its names by the module they come from, in the order of that module."""
     tree = _parsed(door)
-    public = ast.literal_eval(next(node.value for node in tree.body if _target(node) == "__all__"))
     came_from = {
         alias.name: node.module
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and node.module
         for alias in node.names
-        if alias.name in public
+        if alias.asname == alias.name
     }
     yield f"## `{door}`\n\n{_markdown(ast.get_docstring(tree))}\n"
     for module in sorted(set(came_from.values())):

@@ -9,7 +9,7 @@ from typing import Any
 
 
 def on_demand(door: str) -> Callable[[str], Any]:
-    """Return a ``__getattr__`` for module `door` that imports, at first use, its names under ``if TYPE_CHECKING``.
+    """Return a ``__getattr__`` for module `door` that imports, at first use, its names of :func:`public_names`.
 
     With it, a listing of plugins or a command that shows its help imports neither numpy nor links.
     """
@@ -24,15 +24,19 @@ def on_demand(door: str) -> Callable[[str], Any]:
     return imported
 
 
+def public_names(door: str) -> list[str]:
+    """Return the names that a module's source imports as themselves, like ``import Rig as Rig``."""
+    return [*_modules(door)]
+
+
 @cache
 def _modules(door: str) -> Mapping[str, str]:
-    """Return the module of each name that a module's source imports under a condition."""
+    """Return the module of each of the :func:`public_names`."""
     import ast
 
     tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
-    conditions = [node for node in tree.body if isinstance(node, ast.If)]
-    imports = [node for one in conditions for node in one.body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: node.module or "" for node in imports for alias in node.names}
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names if alias.asname == alias.name}
 
 
 def contributed(group: str) -> Mapping[str, Any]:

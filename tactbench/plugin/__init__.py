@@ -6,112 +6,70 @@ one or more of the hooks; ``docs/plugins.md`` shows how. Names for simulated sen
 """
 
 from tactbench.core.errors import (
-    DataError,
-    MissingRecordingError,
-    NotApplicable,
-    PluginContractError,
-    RigError,
-    TactbenchError,
-    UsageError,
+    DataError as DataError,
+    MissingRecordingError as MissingRecordingError,
+    NotApplicable as NotApplicable,
+    PluginContractError as PluginContractError,
+    RigError as RigError,
+    TactbenchError as TactbenchError,
+    UsageError as UsageError,
 )
-from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
-from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
-from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.samples import Block, FloatArray, Quality, StreamReadings
-from tactbench.core.spec.events import AlarmPolicy, SlipTarget
-from tactbench.core.spec.force_profiles import sine, staircase
-from tactbench.core.spec.profile import ForcePath, ForceRamp
-from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
-from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.on_demand import public_names
+from tactbench.core.plugins.hookspecs import API_VERSION as API_VERSION, hookimpl as hookimpl
+from tactbench.core.plugins.interfaces import (
+    Acquisition as Acquisition,
+    Estimator as Estimator,
+    ReplayRig as ReplayRig,
+    Rig as Rig,
+    RigContext as RigContext,
+)
+from tactbench.core.plugins.registry import load_object as load_object, load_registry as load_registry
+from tactbench.core.samples import (
+    Block as Block,
+    FloatArray as FloatArray,
+    Quality as Quality,
+    StreamReadings as StreamReadings,
+)
+from tactbench.core.spec.events import AlarmPolicy as AlarmPolicy, SlipTarget as SlipTarget
+from tactbench.core.spec.force_profiles import sine as sine, staircase as staircase
+from tactbench.core.spec.profile import ForcePath as ForcePath, ForceRamp as ForceRamp
+from tactbench.core.spec.quantity import (
+    Quantity as Quantity,
+    Source as Source,
+    assumed as assumed,
+    derived as derived,
+    measured as measured,
+    sourced as sourced,
+)
+from tactbench.core.spec.recording import PlanEntry as PlanEntry, Scalar as Scalar
 from tactbench.core.spec.rig import (
-    EstimatorDescriptor,
-    IndenterDescriptor,
-    ManualFrame,
-    Parameter,
-    ProfileDescriptor,
-    RigDescriptor,
-    SensorDescriptor,
-    TaskDescriptor,
+    EstimatorDescriptor as EstimatorDescriptor,
+    IndenterDescriptor as IndenterDescriptor,
+    ManualFrame as ManualFrame,
+    Parameter as Parameter,
+    ProfileDescriptor as ProfileDescriptor,
+    RigDescriptor as RigDescriptor,
+    SensorDescriptor as SensorDescriptor,
+    TaskDescriptor as TaskDescriptor,
 )
-from tactbench.core.spec.scene import Indenter, Placement, Role, Scene
+from tactbench.core.spec.scene import Indenter as Indenter, Placement as Placement, Role as Role, Scene as Scene
 from tactbench.core.spec.sensor import (
-    ChannelKind,
-    ChannelSpec,
-    DataSheet,
-    PhysicalRange,
-    SensorSpec,
-    Statement,
-    StreamSpec,
+    ChannelKind as ChannelKind,
+    ChannelSpec as ChannelSpec,
+    DataSheet as DataSheet,
+    PhysicalRange as PhysicalRange,
+    SensorSpec as SensorSpec,
+    Statement as Statement,
+    StreamSpec as StreamSpec,
 )
 from tactbench.core.spec.task import (
-    ChannelTarget,
-    LabelTarget,
-    PlannedScene,
-    Published,
-    Summary,
-    TaskSpec,
-    VectorTarget,
+    ChannelTarget as ChannelTarget,
+    LabelTarget as LabelTarget,
+    PlannedScene as PlannedScene,
+    Published as Published,
+    Summary as Summary,
+    TaskSpec as TaskSpec,
+    VectorTarget as VectorTarget,
 )
 
-__all__ = [
-    "API_VERSION",
-    "Acquisition",
-    "AlarmPolicy",
-    "Block",
-    "ChannelKind",
-    "ChannelSpec",
-    "ChannelTarget",
-    "DataError",
-    "DataSheet",
-    "Estimator",
-    "EstimatorDescriptor",
-    "FloatArray",
-    "ForcePath",
-    "ForceRamp",
-    "Indenter",
-    "IndenterDescriptor",
-    "LabelTarget",
-    "ManualFrame",
-    "MissingRecordingError",
-    "NotApplicable",
-    "Parameter",
-    "PhysicalRange",
-    "Placement",
-    "PlanEntry",
-    "PlannedScene",
-    "PluginContractError",
-    "ProfileDescriptor",
-    "Published",
-    "Quality",
-    "Quantity",
-    "ReplayRig",
-    "Rig",
-    "RigContext",
-    "RigDescriptor",
-    "RigError",
-    "Role",
-    "Scalar",
-    "Scene",
-    "SensorDescriptor",
-    "SensorSpec",
-    "SlipTarget",
-    "Source",
-    "Statement",
-    "StreamReadings",
-    "StreamSpec",
-    "Summary",
-    "TactbenchError",
-    "TaskDescriptor",
-    "TaskSpec",
-    "UsageError",
-    "VectorTarget",
-    "assumed",
-    "derived",
-    "hookimpl",
-    "load_object",
-    "load_registry",
-    "measured",
-    "sine",
-    "sourced",
-    "staircase",
-]
+__all__ = public_names(__name__)

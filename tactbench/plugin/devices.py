@@ -5,150 +5,94 @@
 
 from typing import TYPE_CHECKING
 
-from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
-from tactbench.core.on_demand import on_demand
-from tactbench.core.plugins.interfaces import CheckTable, DeviceAcquisition, DeviceLog, Operator, RigCheck
-from tactbench.core.spec.recording import StreamCounts
-from tactbench.core.spec.rig import DeviceDescriptor
-from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
+from tactbench.core.errors import LinkError as LinkError, LinkTimeout as LinkTimeout, LinkUnplugged as LinkUnplugged
+from tactbench.core.on_demand import on_demand, public_names
+from tactbench.core.plugins.interfaces import (
+    CheckTable as CheckTable,
+    DeviceAcquisition as DeviceAcquisition,
+    DeviceLog as DeviceLog,
+    Operator as Operator,
+    RigCheck as RigCheck,
+)
+from tactbench.core.spec.recording import StreamCounts as StreamCounts
+from tactbench.core.spec.rig import DeviceDescriptor as DeviceDescriptor
+from tactbench.core.spec.rig_file import FORCE as FORCE, NamedDevice as NamedDevice, RigFile as RigFile
 
 if TYPE_CHECKING:
-    from tactbench.devices.control import Control
-    from tactbench.devices.driver import Driver, DriverSettings, Options, RowDriver, Sample, Unwrap, open_for
-    from tactbench.devices.emulation.virtual_time import EmulatedDevice, EmulatedDevices
+    from tactbench.devices.control import Control as Control
+    from tactbench.devices.driver import (
+        Driver as Driver,
+        DriverSettings as DriverSettings,
+        Options as Options,
+        RowDriver as RowDriver,
+        Sample as Sample,
+        Unwrap as Unwrap,
+        open_for as open_for,
+    )
+    from tactbench.devices.emulation.virtual_time import (
+        EmulatedDevice as EmulatedDevice,
+        EmulatedDevices as EmulatedDevices,
+    )
     from tactbench.devices.emulator import (
-        DeviceEmulator,
-        EmulatorSettings,
-        Fault,
-        RowEmulator,
-        Senses,
-        Sent,
-        SpiDeviceEmulator,
-        fault_concerns,
+        DeviceEmulator as DeviceEmulator,
+        EmulatorSettings as EmulatorSettings,
+        Fault as Fault,
+        RowEmulator as RowEmulator,
+        Senses as Senses,
+        Sent as Sent,
+        SpiDeviceEmulator as SpiDeviceEmulator,
+        fault_concerns as fault_concerns,
     )
-    from tactbench.devices.force_loop import ForceLaw, LoopModel
-    from tactbench.devices.force_watch import samples
-    from tactbench.devices.guard import LocalGuard, largest_force_n
+    from tactbench.devices.force_loop import ForceLaw as ForceLaw, LoopModel as LoopModel
+    from tactbench.devices.force_watch import samples as samples
+    from tactbench.devices.guard import LocalGuard as LocalGuard, largest_force_n as largest_force_n
     from tactbench.devices.guard_messages import (
-        Beat,
-        CommandKind,
-        Event,
-        GuardLostError,
-        GuardState,
-        Limits,
+        Beat as Beat,
+        CommandKind as CommandKind,
+        Event as Event,
+        GuardLostError as GuardLostError,
+        GuardState as GuardState,
+        Limits as Limits,
     )
-    from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
+    from tactbench.devices.guard_process import (
+        DeviceSettings as DeviceSettings,
+        Guard as Guard,
+        GuardProcess as GuardProcess,
+        ProcessSettings as ProcessSettings,
+    )
     from tactbench.devices.positioner import (
-        HOMING_S,
-        NotReadyError,
-        Positioner,
-        PositionerError,
-        PositionerFacts,
-        PositionerOptions,
-        PositionerSilentError,
-        PositionerState,
+        HOMING_S as HOMING_S,
+        NotReadyError as NotReadyError,
+        Positioner as Positioner,
+        PositionerError as PositionerError,
+        PositionerFacts as PositionerFacts,
+        PositionerOptions as PositionerOptions,
+        PositionerSilentError as PositionerSilentError,
+        PositionerState as PositionerState,
     )
-    from tactbench.devices.press import Course, Press, PressPlan
-    from tactbench.devices.reading import Reading
-    from tactbench.devices.rig_devices import PressingForce, ask_operator, drivers_of, emulators_of, with_sensor
+    from tactbench.devices.press import Course as Course, Press as Press, PressPlan as PressPlan
+    from tactbench.devices.reading import Reading as Reading
+    from tactbench.devices.rig_devices import (
+        PressingForce as PressingForce,
+        ask_operator as ask_operator,
+        drivers_of as drivers_of,
+        emulators_of as emulators_of,
+        with_sensor as with_sensor,
+    )
     from tactbench.devices.scene_emulators import (
-        RigEmulators,
-        SceneEmulators,
-        ScenePhysics,
-        SceneSamples,
-        physics_of,
+        RigEmulators as RigEmulators,
+        SceneEmulators as SceneEmulators,
+        ScenePhysics as ScenePhysics,
+        SceneSamples as SceneSamples,
+        physics_of as physics_of,
     )
-    from tactbench.links.address import open_link, read_options
-    from tactbench.links.byte_link import ByteLink
-    from tactbench.links.can_link import CanFrame, CanLink, read_can_log
-    from tactbench.links.datagram_link import DatagramLink
-    from tactbench.links.link import Clock, Link, Received
-    from tactbench.links.spi_bridge import SpiBridge
-    from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
+    from tactbench.links.address import open_link as open_link, read_options as read_options
+    from tactbench.links.byte_link import ByteLink as ByteLink
+    from tactbench.links.can_link import CanFrame as CanFrame, CanLink as CanLink, read_can_log as read_can_log
+    from tactbench.links.datagram_link import DatagramLink as DatagramLink
+    from tactbench.links.link import Clock as Clock, Link as Link, Received as Received
+    from tactbench.links.spi_bridge import SpiBridge as SpiBridge
+    from tactbench.links.spi_link import SpiLink as SpiLink, SpiReply as SpiReply, SpiStep as SpiStep
 
-__all__ = [
-    "FORCE",
-    "HOMING_S",
-    "Beat",
-    "ByteLink",
-    "CanFrame",
-    "CanLink",
-    "CheckTable",
-    "Clock",
-    "CommandKind",
-    "Control",
-    "Course",
-    "DatagramLink",
-    "DeviceAcquisition",
-    "DeviceDescriptor",
-    "DeviceEmulator",
-    "DeviceLog",
-    "DeviceSettings",
-    "Driver",
-    "DriverSettings",
-    "EmulatedDevice",
-    "EmulatedDevices",
-    "EmulatorSettings",
-    "Event",
-    "Fault",
-    "ForceLaw",
-    "Guard",
-    "GuardLostError",
-    "GuardProcess",
-    "GuardState",
-    "Limits",
-    "Link",
-    "LinkError",
-    "LinkTimeout",
-    "LinkUnplugged",
-    "LocalGuard",
-    "LoopModel",
-    "NamedDevice",
-    "NotReadyError",
-    "Operator",
-    "Options",
-    "Positioner",
-    "PositionerError",
-    "PositionerFacts",
-    "PositionerOptions",
-    "PositionerSilentError",
-    "PositionerState",
-    "Press",
-    "PressPlan",
-    "PressingForce",
-    "ProcessSettings",
-    "Reading",
-    "Received",
-    "RigCheck",
-    "RigEmulators",
-    "RigFile",
-    "RowDriver",
-    "RowEmulator",
-    "Sample",
-    "SceneEmulators",
-    "ScenePhysics",
-    "SceneSamples",
-    "Senses",
-    "Sent",
-    "SpiBridge",
-    "SpiDeviceEmulator",
-    "SpiLink",
-    "SpiReply",
-    "SpiStep",
-    "StreamCounts",
-    "Unwrap",
-    "ask_operator",
-    "drivers_of",
-    "emulators_of",
-    "fault_concerns",
-    "largest_force_n",
-    "open_for",
-    "open_link",
-    "physics_of",
-    "read_can_log",
-    "read_options",
-    "samples",
-    "with_sensor",
-]
-
+__all__ = public_names(__name__)
 __getattr__ = on_demand(__name__)
