@@ -78,7 +78,11 @@ class Driver(ABC):
         self.clock = settings.clock
         """Clock of the host [ns]."""
         self.options: Any = read_options(self.options_kind, settings.options, device)
-        self.link: Any = open_for(settings, device, self.link_kind, self.address)
+        self.link: Any = settings.open_link()
+        if not isinstance(self.link, self.link_kind):
+            self.link.close()
+            hint = f"Use a link like {self.address}."
+            raise UsageError(f"{device} cannot use the kind of link {self.link.address}.", hint=hint)
 
     @property
     @abstractmethod
@@ -143,18 +147,6 @@ class Driver(ABC):
 def fault_text(error: Exception) -> str:
     """Return the message of an error for use inside a sentence: without its hint and final full stop."""
     return (error.message if isinstance(error, TactbenchError) else error_text(error)).rstrip(".")
-
-
-_Link = TypeVar("_Link", bound=Link)
-
-
-def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:
-    """Return the open link of a driver; raises UsageError for a wrong kind of link, LinkError if it does not open."""
-    link = settings.open_link()
-    if not isinstance(link, kind):
-        link.close()
-        raise UsageError(f"{device} cannot use the kind of link {link.address}.", hint=f"Use a link like {example}.")
-    return link
 
 
 class Sample(NamedTuple):

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         RowDriver as RowDriver,
         Sample as Sample,
         Unwrap as Unwrap,
-        open_for as open_for,
     )
     from tactbench.devices.emulation.virtual_time import (
         EmulatedDevice as EmulatedDevice,
