@@ -20,7 +20,7 @@ from typing import Any
 import guard_faults as faults
 import numpy as np
 
-from tactbench.devices.emulation.line import LinkFault
+from tactbench.devices.emulator import LinkFault
 from tactbench.devices.guard_messages import GuardRefusesError, Report
 from tactbench.plugin.devices import (
     Beat,

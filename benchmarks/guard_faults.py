@@ -373,7 +373,7 @@ def sensed(names: Mapping[str, float]) -> Callable[[list[float], float], list[fl
 
 def schedule(setting: Setting, faults: tuple[tuple[str, float], ...]) -> Outcome:
     """Press once with faults at virtual seconds, and see what becomes of it."""
-    from tactbench.devices.emulation.line import LinkFault
+    from tactbench.devices.emulator import LinkFault
 
     at = dict(faults)
     texts: dict[str, list[Any]] = {"motor": [], "force": [], "motor_link": [], "force_link": []}

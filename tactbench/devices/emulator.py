@@ -60,13 +60,6 @@ class EmulatorSettings:
     """Faults as text, in the format of :meth:`~tactbench.devices.emulator.Fault.parse`."""
 
 
-LINK_FAULTS = {
-    "unplug": "the link is gone from start_s on",
-    "late": "data sent by the device arrive later by delay_s, in the same order",
-}
-"""Names and effects of the faults available for every emulated device."""
-
-
 @dataclass(frozen=True)
 class Fault:
     """Fault of an emulated device, active from `start_s` until just before `end_s` on the emulator's clock [s].
@@ -90,7 +83,7 @@ class Fault:
 
     def __post_init__(self) -> None:
         if self.name not in self.known:
-            raise UnknownNameError("fault", self.name, {*self.known, *LINK_FAULTS})
+            raise UnknownNameError("fault", self.name, {*self.known, *LinkFault.known})
         if self.every < 1:
             raise UsageError(f"`every` of the fault {self.name!r} is {self.every}.", hint="Give 1 or more.")
 
@@ -125,6 +118,18 @@ class Fault:
         return self.start_s <= now_s < self.end_s
 
 
+@dataclass(frozen=True)
+class LinkFault(Fault):
+    """Fault of a link, possible for every emulated device."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "unplug": "the link is gone from start_s on",
+        "late": "data sent by the device arrive later by delay_s, in the same order",
+    }
+    delay_s: float = 0.05
+    """Delay of data by the fault [s]: five periods at 100 Hz."""
+
+
 def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:
     """Return True if a fault `name` affects the next word, line or datagram; `seen` counts those it can affect."""
     concerned = [fault for fault in faults if fault.name == name and fault.active(now_s)]
@@ -133,7 +138,7 @@ def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Count
 
 
 class RowEmulator(ABC):
-    """Emulator of a device read by a :class:`~tactbench.devices.row_driver.RowDriver`; it has link faults only."""
+    """Emulator of a device read by a :class:`~tactbench.devices.driver.RowDriver`; it has link faults only."""
 
     stream: ClassVar[StreamSpec]
     """Stream of the values that the device senses."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from tactbench.core.samples import Block, FloatArray, Quality
 from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import SequenceCheck
 from tactbench.devices.guard_messages import Limits, Trigger
-from tactbench.devices.sequence import SequenceCheck
 
 DELAY_WINDOW_NS = 1_000_000_000
 """Half of the time over which the least delay of a device's samples is determined [ns] (assumed: clocks that differ by
@@ -94,13 +94,9 @@ class ForceWatch:
             self._sound.popleft()
         return fmean(force_n for _, force_n in self._sound) if len(self._sound) == count else math.nan
 
-    def age_s(self, now_ns: int) -> float:
-        """Return the age of the newest sample [s]; infinite if there is no sample."""
-        return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else math.inf
-
     def old(self, now_ns: int, limits: Limits) -> Problem | None:
         """Return the problem if the newest sample is too old; None if it is not."""
-        age_s = self.age_s(now_ns)
+        age_s = 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else math.inf
         if age_s <= limits.force_age_s:
             return None
         return Trigger.FORCE_OLD, f"the force is {1e3 * age_s:.1f} ms old, limit {1e3 * limits.force_age_s:.1f} ms"

@@ -15,8 +15,7 @@ from tactbench.core.errors import LinkError, RigError, UsageError
 from tactbench.core.samples import COLUMNS, Block, Quality, join_blocks
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, fault_text
-from tactbench.devices.sequence import SequenceCheck
+from tactbench.devices.driver import Driver, SequenceCheck, fault_text
 from tactbench.links.link import Clock
 
 QUEUE_S = 5.0

@@ -14,7 +14,7 @@ from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
 
 if TYPE_CHECKING:
     from tactbench.devices.control import Control
-    from tactbench.devices.driver import Driver, DriverSettings, Options, open_for
+    from tactbench.devices.driver import Driver, DriverSettings, Options, RowDriver, Sample, Unwrap
     from tactbench.devices.emulation.virtual_time import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulator import (
         DeviceEmulator,
@@ -49,10 +49,8 @@ if TYPE_CHECKING:
         PositionerState,
     )
     from tactbench.devices.press import Course, Press, PressPlan
-    from tactbench.devices.pressing_force import PressingForce
     from tactbench.devices.reading import Reading
-    from tactbench.devices.rig_devices import ask_operator, drivers_of, emulators_of, with_sensor
-    from tactbench.devices.row_driver import RowDriver, Sample
+    from tactbench.devices.rig_devices import PressingForce, ask_operator, drivers_of, emulators_of, with_sensor
     from tactbench.devices.scene_emulators import (
         RigEmulators,
         SceneEmulators,
@@ -60,7 +58,6 @@ if TYPE_CHECKING:
         SceneSamples,
         physics_of,
     )
-    from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link, read_options
     from tactbench.links.can_link import CanFrame, CanLink, read_can_log
     from tactbench.links.link import ByteLink, Clock, DatagramLink, Link, Received
@@ -142,7 +139,6 @@ __all__ = [
     "emulators_of",
     "fault_concerns",
     "largest_force_n",
-    "open_for",
     "open_link",
     "physics_of",
     "read_can_log",

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tactbench.devices.emulation.line import LinkFault
+from tactbench.devices.emulator import LinkFault
 from tactbench.plugin import ChannelSpec, Quality, StreamSpec, UsageError, assumed
 from tactbench.plugin.devices import (
     ByteLink,

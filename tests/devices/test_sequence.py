@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.samples import Block, Quality
-from tactbench.devices.sequence import SequenceCheck
+from tactbench.devices.driver import SequenceCheck
 from tactbench.plugin.devices import Unwrap
 
 

@@ -13,8 +13,7 @@ from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import RigCheck
-    from tactbench.devices.cli.device_check import DeviceCheck
-    from tactbench.devices.cli.host_devices import HostItem
+    from tactbench.devices.cli.device_check import DeviceCheck, HostItem
 
 
 @click.command(name="doctor", short_help="List ports, buses and permissions, and check a rig's devices.")
@@ -39,8 +38,7 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.tables.terminal import remark
-    from tactbench.devices.cli.device_check import check_devices
-    from tactbench.devices.cli.host_devices import look_at_host
+    from tactbench.devices.cli.device_check import check_devices, look_at_host
     from tactbench.devices.rig_devices import descriptor_of
 
     registry = load_registry()

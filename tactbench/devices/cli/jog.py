@@ -18,8 +18,7 @@ from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Limits
 from tactbench.devices.positioner import Positioner
-from tactbench.devices.pressing_force import PressingForce
-from tactbench.devices.rig_devices import drivers_of
+from tactbench.devices.rig_devices import PressingForce, drivers_of
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import RigCheck

@@ -34,10 +34,10 @@ from tactbench.core.samples import Block, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
+from tactbench.devices.driver import RowDriver
 from tactbench.devices.emulation.virtual_time import EmulatedDevices
 from tactbench.devices.emulator import Senses
 from tactbench.devices.rig_devices import emulated_device, open_driver
-from tactbench.devices.row_driver import RowDriver
 
 # All numbers are assumed.
 READ_S, RATED_S, WAIT_S, SHORT_S = 1.0, 3.0, 0.1, 0.005  # a reading; one of the rate; longest wait of a read; no wait

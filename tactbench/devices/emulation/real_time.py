@@ -14,8 +14,7 @@ from contextlib import suppress
 from typing import Self
 
 from tactbench.core.errors import UsageError
-from tactbench.devices.emulation.line import Line, Piece
-from tactbench.devices.emulation.virtual_time import SPI_HZ, EmulatedDevice
+from tactbench.devices.emulation.virtual_time import SPI_HZ, EmulatedDevice, Line, Piece
 from tactbench.devices.emulator import DeviceEmulator, Sent
 from tactbench.links.can_link import CanFrame
 from tactbench.links.link import LARGEST_DATAGRAM

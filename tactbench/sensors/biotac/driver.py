@@ -50,8 +50,6 @@ from tactbench.plugin.devices import (
     SpiLink,
     SpiReply,
     SpiStep,
-    open_for,
-    read_options,
 )
 from tactbench.sensors.biotac.codec import (
     COMMAND_RATE,
@@ -87,33 +85,34 @@ class BioTacDriver(Driver):
         If the link cannot be opened.
     """
 
+    device, link_kind, address, options_kind = "biotac", SpiLink, "spi://bridge/PORT?speed_hz=4400000", BioTacOptions
+    link: SpiLink
+    options: BioTacOptions
+
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = read_options(BioTacOptions, settings.options, "biotac")
-        self._clock = settings.clock
+        super().__init__(settings)
         self._counts: Counter[str] = Counter()
         self._running = False
-        example = "spi://bridge/PORT?speed_hz=4400000"
-        self._link = open_for(settings, "a BioTac", SpiLink, example)  # type: ignore[type-abstract]
-        self._ahead = min(self._options.batches_ahead, self._link.holds)
+        self._ahead = min(self.options.batches_ahead, self.link.holds)
         try:
             slowest, fastest = SLOWEST_CLOCK.to("Hz"), FASTEST_CLOCK.to("Hz")
-            if not slowest <= self._link.speed_hz <= fastest:
+            if not slowest <= self.link.speed_hz <= fastest:
                 raise RigError(
-                    f"{self._link.address} runs at {self._link.speed_hz} Hz; {slowest:g} to {fastest:g} Hz is expected "
+                    f"{self.link.address} runs at {self.link.speed_hz} Hz; {slowest:g} to {fastest:g} Hz is expected "
                     "for a BioTac.",
                     hint="Choose speed_hz=4400000, or the adapter's next lower clock.",
                 )
             self._set_up()
         except RigError:
-            self._link.close()
+            self.link.close()
             raise
 
     def _set_up(self) -> None:
         """Reset the driver to frame position 0 and no pending batches."""
-        options = self._options
+        options = self.options
         self._batches = FrameBatches(
             options.frame,
-            speed_hz=self._link.speed_hz,
+            speed_hz=self.link.speed_hz,
             select=options.select,
             resends=options.resends,
             # About as many words as in the default frame: a batch for each short one would ask too much of a bridge.
@@ -122,14 +121,14 @@ class BioTacDriver(Driver):
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
         self._last: tuple[int, int] | None = None
-        self._received_ns = self._clock()
+        self._received_ns = self.clock()
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
         """The spec's streams, limited to the channels in the option `frame`, at that frame's rates."""
         rate_hz = COMMAND_RATE.to("Hz")
-        source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self._options.frame)}")
-        return streams_of(self._options.frame, rate_hz, source)
+        source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self.options.frame)}")
+        return streams_of(self.options.frame, rate_hz, source)
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -161,21 +160,21 @@ class BioTacDriver(Driver):
             text = property_text(name, raw)
             if text is None and name == "serial number":
                 raise RigError(
-                    f"No BioTac answers at {self._link.address}, select lines {self._options.select:#x}: the serial "
+                    f"No BioTac answers at {self.link.address}, select lines {self.options.select:#x}: the serial "
                     f"number was read as bytes {raw.hex(' ')}; a text that begins with BT is expected.",
                     hint="Check supply, wiring and the option `select`.",
                 )
             found[name] = raw.hex(" ") if text is None else text
-        if isinstance(self._link, SpiBridge):
-            found["adapter"] = self._link.name
+        if isinstance(self.link, SpiBridge):
+            found["adapter"] = self.link.name
         return found
 
     def _property(self, name: str) -> bytes:
-        select, pauses = self._options.select, (round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us")))
+        select, pauses = self.options.select, (round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us")))
         data = (property_command(name), bytes(PROPERTIES[name][1]))
-        number = self._link.send([SpiStep(part, select, pause) for part, pause in zip(data, pauses, strict=True)])
+        number = self.link.send([SpiStep(part, select, pause) for part, pause in zip(data, pauses, strict=True)])
         while True:
-            reply = self._link.receive(PATIENCE_S)
+            reply = self.link.receive(PATIENCE_S)
             if reply.number == number:
                 return reply.data[1]
 
@@ -190,7 +189,7 @@ class BioTacDriver(Driver):
     def _send(self) -> None:
         while len(self._sent) < self._ahead:
             first, steps = self._batches.next()
-            self._sent.append((self._link.send(steps), first))
+            self._sent.append((self.link.send(steps), first))
 
     def read(self, timeout_s: float) -> list[Block]:
         """Return the samples of the frames that have ended; see :class:`Driver`. When stopped, return an empty list.
@@ -202,7 +201,7 @@ class BioTacDriver(Driver):
         for _ in range(self._ahead):
             self._send()
             try:
-                reply = self._link.receive(timeout_s)
+                reply = self.link.receive(timeout_s)
             except LinkTimeout:
                 self._give_up_lost()
                 break
@@ -213,15 +212,15 @@ class BioTacDriver(Driver):
     def _give_up_lost(self) -> None:
         """Drop all pending batches if no reply has come for longer than they can take together."""
         due_ns = self._ahead * self._batches.timing(0)[1] + round(PATIENCE_S * 1e9)
-        if self._clock() - self._received_ns > due_ns:
-            self._link.abandon()
+        if self.clock() - self._received_ns > due_ns:
+            self.link.abandon()
             self._counts["batches lost"] += len(self._sent)
             self._sent.clear()
-            self._received_ns = self._clock()
+            self._received_ns = self.clock()
 
     def _take(self, reply: SpiReply) -> None:
         """Take the rows of a batch from its reply; the batches sent before it are lost."""
-        self._received_ns = self._clock()
+        self._received_ns = self.clock()
         numbers = [number for number, _ in self._sent]
         if reply.number not in numbers:
             return
@@ -255,11 +254,6 @@ class BioTacDriver(Driver):
         self._running = False
         with contextlib.suppress(LinkError):
             while self._sent:
-                self._link.receive(PATIENCE_S)
+                self.link.receive(PATIENCE_S)
                 self._sent.popleft()
-        self._link.abandon()
-
-    def close(self) -> None:
-        """Stop sampling and close the link to the adapter."""
-        self.stop()
-        self._link.close()
+        self.link.abandon()

@@ -15,8 +15,6 @@ from tactbench.plugin.devices import (
     LinkError,
     LinkTimeout,
     LinkUnplugged,
-    open_for,
-    read_options,
 )
 from tactbench.sensors.icub.codec import (
     Command,
@@ -60,9 +58,13 @@ class FingertipDriver(Driver):
         If the link cannot be opened.
     """
 
+    device, link_kind, address, options_kind = "icub", CanLink, "can://socketcan/can0", FingertipOptions
+    link: CanLink
+    options: FingertipOptions
+
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = options = read_options(FingertipOptions, settings.options, "icub")
-        self._clock = settings.clock
+        super().__init__(settings)
+        options = self.options
         stream = next((one for one in settings.streams if one.name == STREAMS[0].name), STREAMS[0])
         rate = Source(tag="derived", reference=f"the board is set up for {1e3 * options.period_s:g} ms")
         self._stream = stream.model_copy(update={"rate_hz": 1 / options.period_s, "rate_source": rate})
@@ -75,7 +77,6 @@ class FingertipDriver(Driver):
         """Numbers of faults by name, from before the last start."""
         self._others = 0
         self._decoder = self._fresh_decoder()
-        self._link = open_for(settings, "icub", CanLink, "can://socketcan/can0")  # type: ignore[type-abstract]
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -85,7 +86,7 @@ class FingertipDriver(Driver):
     @property
     def counts(self) -> Mapping[str, int]:
         """Numbers of faults by the decoder's names, of other senders' frames, and of frames without skin data."""
-        return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
+        return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self.link.counts
 
     def identify(self) -> Mapping[str, str]:
         """Return board, triangle, and the firmware's version; a board with old firmware may not answer.
@@ -97,14 +98,14 @@ class FingertipDriver(Driver):
         LinkUnplugged
             If the adapter is gone.
         """
-        options = self._options
+        options = self.options
         about = {"board": str(options.board), "triangle": str(options.triangle)}
         request = VersionRequest()
         self._send(request)
-        until_ns = self._clock() + round(1e9 * ANSWER_S)
-        while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
+        until_ns = self.clock() + round(1e9 * ANSWER_S)
+        while (left_s := 1e-9 * (until_ns - self.clock())) > 0:
             try:
-                answer = read_version(self._link.receive(left_s))
+                answer = read_version(self.link.receive(left_s))
             except LinkTimeout:
                 break
             if answer is not None and answer[0] == options.board:
@@ -130,24 +131,24 @@ class FingertipDriver(Driver):
         self._earlier += self._counted()
         self._decoder = self._fresh_decoder()
         self._sampling = False
-        for command in self._options.commands:
+        for command in self.options.commands:
             self._send(command)
-        until_ns = self._clock() + round(1e9 * SETTLE_S)
-        while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
+        until_ns = self.clock() + round(1e9 * SETTLE_S)
+        while (left_s := 1e-9 * (until_ns - self.clock())) > 0:
             with suppress(LinkTimeout):
-                self._link.receive(left_s)  # from before, or of the old set-up, which starts by itself
+                self.link.receive(left_s)  # from before, or of the old set-up, which starts by itself
         self._send(Transmit(on=True))
         self._sampling = True
 
     def read(self, timeout_s: float) -> list[Block]:  # noqa: D102  (inherited)
-        until_ns = self._clock() + round(1e9 * timeout_s)
+        until_ns = self.clock() + round(1e9 * timeout_s)
         samples: list[Sample] = []
         for _ in range(MOST_FRAMES):
-            left_s = 0.0 if samples else max(0.0, 1e-9 * (until_ns - self._clock()))
+            left_s = 0.0 if samples else max(0.0, 1e-9 * (until_ns - self.clock()))
             try:
-                frame = self._link.receive(left_s)
+                frame = self.link.receive(left_s)
             except LinkTimeout:
-                samples += self._decoder.flush(self._clock() - round(1e9 * self._options.period_s))
+                samples += self._decoder.flush(self.clock() - round(1e9 * self.options.period_s))
                 break
             except LinkUnplugged:
                 samples += self._decoder.flush()
@@ -164,12 +165,8 @@ class FingertipDriver(Driver):
             with suppress(LinkError):
                 self._send(Transmit(on=False))
 
-    def close(self) -> None:  # noqa: D102  (inherited)
-        self.stop()
-        self._link.close()
-
     def _fresh_decoder(self) -> SkinDecoder:
-        return SkinDecoder(self._options.period_s, old_ids=self._options.old_setup)
+        return SkinDecoder(self.options.period_s, old_ids=self.options.old_setup)
 
     def _counted(self) -> Counter[str]:
         """Return the decoder's numbers of faults; the decoder receives frames of one triangle only."""
@@ -179,9 +176,9 @@ class FingertipDriver(Driver):
         return found
 
     def _send(self, command: Command) -> None:
-        frame = command_frame(self._options.board, command)
+        frame = command_frame(self.options.board, command)
         self._sent.add((frame.id, frame.data))
-        self._link.send(frame)
+        self.link.send(frame)
 
     def _taken(self, frame: CanFrame) -> list[Sample]:
         """Return the samples that end with `frame`; count frames that are not the fingertip's."""

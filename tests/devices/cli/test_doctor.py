@@ -13,8 +13,7 @@ from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, Source, StreamSpec
-from tactbench.devices.cli.device_check import check_devices
-from tactbench.devices.cli.host_devices import look_at_host
+from tactbench.devices.cli.device_check import check_devices, look_at_host
 from tactbench.plugin.devices import Driver
 from tests.conftest import Verbs
 

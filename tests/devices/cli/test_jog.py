@@ -7,7 +7,7 @@ import pytest
 from tactbench.core.errors import LinkUnplugged
 from tactbench.core.spec.rig_file import ForceEntry
 from tactbench.devices.cli.jog import move_by_steps
-from tactbench.devices.emulation.line import split_faults
+from tactbench.devices.emulation.virtual_time import split_faults
 from tactbench.plugin import load_object, load_registry
 from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices, EmulatorSettings
 from tests.conftest import ROOT, Verbs

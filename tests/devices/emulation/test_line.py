@@ -7,7 +7,8 @@ import math
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.devices.emulation.line import Line, LinkFault, split_faults
+from tactbench.devices.emulation.virtual_time import Line, split_faults
+from tactbench.devices.emulator import LinkFault
 from tests.devices.emulation.models import Answerer, Recorder
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
-from tactbench.devices.emulation.line import LinkFault
 from tactbench.devices.emulation.virtual_time import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulator import LinkFault
 from tactbench.plugin.devices import ByteLink, CanFrame, CanLink, SpiLink, SpiStep
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 

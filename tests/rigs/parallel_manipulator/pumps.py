@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.devices.emulation.line import Line
-from tactbench.devices.emulation.virtual_time import VirtualByteLink, VirtualDatagramLink, VirtualTime
+from tactbench.devices.emulation.virtual_time import Line, VirtualByteLink, VirtualDatagramLink, VirtualTime
 from tactbench.plugin import Block
 
 

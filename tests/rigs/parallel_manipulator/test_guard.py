@@ -226,7 +226,7 @@ def test_a_touch_on_a_fast_approach_ends_it(made):
     ids=lambda value: str(value).split(":")[0],
 )
 def test_what_goes_wrong_in_devices_leads_to_a_fault(where, text, trigger, tmp_path):
-    from tactbench.devices.emulation.line import LinkFault
+    from tactbench.devices.emulator import LinkFault
 
     parse = {"force": FAULTS.DatagramFault, "motor": FAULTS.MotorFault}.get(where, LinkFault).parse
     # The press begins at 0.5 s and lasts for two seconds and a half; five samples are lost.

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.devices.sequence import SequenceCheck
+from tactbench.devices.driver import SequenceCheck
 from tactbench.plugin import Quality, RigError, UsageError
 from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeout, LinkUnplugged
 from tactbench.rigs.parallel_manipulator.net_ft.driver import (
