@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import ALIKE, Cell
-from tactbench.core.matrix.store.store import signature
+from tactbench.core.matrix.store import signature
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.pool.child import plain_error
-from tactbench.core.provenance.gather import host_id
+from tactbench.core.pool import plain_error
+from tactbench.core.provenance import host_id
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.row import RowModel

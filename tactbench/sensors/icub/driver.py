@@ -18,6 +18,7 @@ from tactbench.plugin.devices import (
     open_for,
     read_options,
 )
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     Command,
     Sample,
@@ -30,7 +31,6 @@ from tactbench.sensors.icub.codec import (
     to_block,
 )
 from tactbench.sensors.icub.options import FingertipOptions
-from tactbench.sensors.icub.spec import STREAMS
 
 SETTLE_S = 0.5
 """Seconds between set-up and start, for the board to take its baseline [sourced: icub-main CanBusSkin.cpp]."""

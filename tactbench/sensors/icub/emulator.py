@@ -27,6 +27,7 @@ from tactbench.plugin.devices import (
     fault_concerns,
     read_options,
 )
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
     BROADCAST,
@@ -46,7 +47,6 @@ from tactbench.sensors.icub.codec import (
     version_frame,
 )
 from tactbench.sensors.icub.options import FingertipOptions
-from tactbench.sensors.icub.spec import STREAMS
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
 """Version of the emulated board: an MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public

@@ -10,6 +10,7 @@ import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
 from tactbench.plugin.devices import CanFrame, DeviceLog, read_can_log, read_options
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
@@ -22,7 +23,6 @@ from tactbench.sensors.icub.codec import (
     to_block,
 )
 from tactbench.sensors.icub.options import LogOptions
-from tactbench.sensors.icub.spec import STREAMS
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:

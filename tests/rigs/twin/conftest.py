@@ -20,8 +20,8 @@ from tactbench.rigs.twin.geometry import skin_grid
 from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.synthesis import Synthesis
-from tactbench.sensors.biotac.spec import SPEC as BIOTAC
-from tactbench.sensors.icub.spec import SPEC as ICUB
+from tactbench.sensors.biotac import SPEC as BIOTAC
+from tactbench.sensors.icub import SPEC as ICUB
 
 SPECS = {"biotac": BIOTAC, "icub": ICUB}
 EFFECTS = tuple(tactbench_effects())

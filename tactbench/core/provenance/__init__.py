@@ -1,1 +1,0 @@
-"""Provenance of results: digests of source code, versions of software, and the machine."""
