@@ -27,7 +27,8 @@ from tactbench.core.interrupts import interrupts_held
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
-from tactbench.core.pool import Engine, Limits, Pool, plain_error, preload
+from tactbench.core.pool import Engine, Limits, Pool, preload
+from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance import ANSWERING, sources_of, versions
 from tactbench.core.thread_limit import VARIABLES
 

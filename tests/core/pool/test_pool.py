@@ -11,7 +11,8 @@ import pytest
 
 from tactbench.core import pool
 from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
-from tactbench.core.pool import InProcess, Limits, Pool, resident_mb
+from tactbench.core.pool import InProcess, Limits, Pool
+from tactbench.core.pool.child import resident_mb
 from tests.conftest import ROOT
 from tests.core.pool.patience import ending, gone, until
 from tests.core.pool.works import work
