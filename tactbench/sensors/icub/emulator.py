@@ -46,7 +46,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
     version_frame,
 )
-from tactbench.sensors.icub.options import FingertipOptions
+from tactbench.sensors.icub.driver import FingertipOptions
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
 """Version of the emulated board: an MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public

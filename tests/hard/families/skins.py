@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
+from tactbench.rigs.twin.contact.media import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import skin_grid

@@ -27,7 +27,7 @@ from tactbench.plugin.simulation import (
     Transducer,
     TransducerFactory,
 )
-from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.media import Medium, foam_medium, layer_medium
 from tactbench.rigs.twin.contact.press import AnyPress, LocalPress, Press, whole_skin
 from tactbench.rigs.twin.geometry import gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Fidelity, Synthesis
@@ -108,7 +108,7 @@ def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
 
 
 def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:
-    """Return the medium on `grid` of a skin in a sensor's spec; only the module of this kind of skin is imported.
+    """Return the medium on `grid` of a skin in a sensor's spec.
 
     Raises
     ------
@@ -128,10 +128,4 @@ def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) ->
         from tactbench.rigs.twin.contact import shell
 
         return shell.medium(skin, grid)
-    if isinstance(skin, FoamPad):
-        from tactbench.rigs.twin.contact import foam
-
-        return foam.medium(skin, grid)
-    from tactbench.rigs.twin.contact import layer
-
-    return layer.medium(skin, grid)
+    return foam_medium(skin, grid) if isinstance(skin, FoamPad) else layer_medium(skin, grid)
