@@ -19,8 +19,8 @@ import numpy as np
 from tactbench.plugin import FloatArray, SensorSpec, load_object
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Fidelity
 from tactbench.sensors.biotac import SPEC as BIOTAC

@@ -19,7 +19,7 @@ from tactbench.plugin import (
     Scene,
 )
 from tactbench.plugin.simulation import EffectDescriptor, Environment, Slide
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.planner import prepare
 from tactbench.rigs.twin.rig import build
 from tests.rigs.twin.conftest import EFFECTS, SILENT, TWIN, named, q
 
