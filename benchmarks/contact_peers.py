@@ -91,7 +91,7 @@ def own_newton(cells: int, penalty: float) -> Solve:
     from tactbench.plugin import assumed
     from tactbench.plugin.simulation import BondedLayer, SkinSheet
     from tactbench.rigs.twin.contact.newton import NewtonSolver
-    from tactbench.rigs.twin.contact.pressing import medium_of
+    from tactbench.rigs.twin.contact.stages import medium_of
     from tactbench.rigs.twin.geometry import skin_grid
 
     half = LAYER_SIDE / 2

@@ -19,12 +19,12 @@ import numpy as np
 from tactbench.plugin import FloatArray, SensorSpec, load_object
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Fidelity
-from tactbench.sensors.biotac.spec import SPEC as BIOTAC
-from tactbench.sensors.icub.spec import SPEC as ICUB
+from tactbench.sensors.biotac import SPEC as BIOTAC
+from tactbench.sensors.icub import SPEC as ICUB
 
 LOADS_N = np.array([0.1, 0.25, 0.5, 0.8, 1.2, 2.0, 3.0, 4.0, 5.0])
 # Off the cells' centres and edges, by other amounts each.

@@ -22,7 +22,7 @@ _MANIPULATOR = "tactbench.rigs.parallel_manipulator"
 RIG_FILES = {
     "Every rig file": ("tactbench.core.spec.rig_file",),
     "Options of the BioTac": ("tactbench.sensors.biotac.frames",),
-    "Options of the iCub fingertip": ("tactbench.sensors.icub.options",),
+    "Options of the iCub fingertip": ("tactbench.sensors.icub.driver", "tactbench.sensors.icub.log"),
     "Options of net-ft": (f"{_MANIPULATOR}.net_ft.driver",),
     "Options of every axis": ("tactbench.devices.positioner",),
     "Options of faulhaber, beside those of every axis": (f"{_MANIPULATOR}.motor.codec",),

@@ -20,9 +20,9 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import cg
 from skfem.models import poisson  # noqa: F401
 
+from tactbench.sensors.biotac import SKIN, SPEC
 from tactbench.sensors.biotac.conduction import Disc, Faces, FilmSheet, RimmedDiscs, faces_between
 from tactbench.sensors.biotac.meshes import sheet_x
-from tactbench.sensors.biotac.spec import SKIN, SPEC
 from tactbench.sensors.biotac.transduction import disc_at, mid_film_mm
 
 OUTER, DOME, END = (SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm"), SKIN.sheet.x_max.to("mm"))

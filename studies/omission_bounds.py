@@ -42,7 +42,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.planner import carried_out
 from tactbench.rigs.twin.rig import Twin, build
 from tactbench.rigs.twin.synthesis import Synthesis
 

@@ -32,7 +32,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
-from tactbench.core.provenance.gather import usable_cores
+from tactbench.core.provenance import usable_cores
 from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates

@@ -28,7 +28,7 @@ from tactbench.core.plugins.declared import declared_in
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
-from tactbench.core.provenance.gather import gather
+from tactbench.core.provenance import gather
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.spec.row import DIRECTIONS, STOPPED
 from tactbench.core.spec.task import TASKS_FILE, TaskSpec

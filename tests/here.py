@@ -26,7 +26,7 @@ def make_here(patch: pytest.MonkeyPatch) -> None:
 def forget(folders: Iterable[Path]) -> None:
     """Forget what this process has imported from `folders`, the recordings it has read and the sources it has seen."""
     from tactbench.core.matrix import solve
-    from tactbench.core.provenance.source import source_digest
+    from tactbench.core.provenance import source_digest
 
     solve._last.clear()
     solve._prepared.clear()

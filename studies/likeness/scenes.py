@@ -22,8 +22,8 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, around_mm, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build
 

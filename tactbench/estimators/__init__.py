@@ -25,51 +25,51 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
     """Return the descriptors of the estimators that this package provides."""
     nothing: dict[str, Any] = {"looks_at": "nothing", "baseline": True}
     return [
-        _estimator("mean", "Mean of the training labels", REGRESSION, "trivial:mean", **nothing),
+        _estimator("mean", "Mean of the training labels", REGRESSION, "models:mean", **nothing),
         _estimator(
             "time-index", "Linear regression on the time index (the paper's lower bound)", REGRESSION,
-            "linear:least_squares", looks_at="time", baseline=True, linear=True,
+            "models:least_squares", looks_at="time", baseline=True, linear=True,
         ),
         _estimator(
-            "majority", "Most frequent class of the training labels", CLASSIFICATION, "trivial:majority", **nothing
+            "majority", "Most frequent class of the training labels", CLASSIFICATION, "models:majority", **nothing
         ),
-        _estimator("chance", "A class drawn uniformly", CLASSIFICATION, "trivial:chance", **nothing),
-        _estimator("ols", "Ordinary least squares on one sample", REGRESSION, "linear:least_squares", linear=True),
+        _estimator("chance", "A class drawn uniformly", CLASSIFICATION, "models:chance", **nothing),
+        _estimator("ols", "Ordinary least squares on one sample", REGRESSION, "models:least_squares", linear=True),
         _estimator(
-            "lasso", "Lasso on a mean-filtered window", REGRESSION, "linear:lasso", linear=True,
+            "lasso", "Lasso on a mean-filtered window", REGRESSION, "models:lasso", linear=True,
             params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
         ),
         _estimator(
-            "ridge", "Ridge regression on a mean-filtered window", REGRESSION, "linear:ridge", linear=True,
+            "ridge", "Ridge regression on a mean-filtered window", REGRESSION, "models:ridge", linear=True,
             params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS,
         ),
         _estimator(
-            "logistic", "Logistic regression", CLASSIFICATION, "linear:logistic", linear=True, params={"C": 1.0}
+            "logistic", "Logistic regression", CLASSIFICATION, "models:logistic", linear=True, params={"C": 1.0}
         ),
-        _estimator("lda", "Linear discriminant analysis", CLASSIFICATION, "linear:discriminant", linear=True),
+        _estimator("lda", "Linear discriminant analysis", CLASSIFICATION, "models:discriminant", linear=True),
         _estimator(
-            "knn", "k nearest neighbours", BOTH, "nonlinear:neighbours", linear=False, params={"n_neighbors": 15}
+            "knn", "k nearest neighbours", BOTH, "models:neighbours", linear=False, params={"n_neighbors": 15}
         ),
         _estimator(
             "svm", "Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", BOTH,
-            "nonlinear:support_vectors", linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
+            "models:support_vectors", linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
         ),
         _estimator(
-            "boosting", "Gradient boosting on histograms", BOTH, "nonlinear:boosting", linear=False,
+            "boosting", "Gradient boosting on histograms", BOTH, "models:boosting", linear=False,
             params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31}, rehearsal={"max_iter": 2},
         ),
         _estimator(
-            "mlp", "Neural network with one hidden layer", BOTH, "nonlinear:perceptron", linear=False,
+            "mlp", "Neural network with one hidden layer", BOTH, "models:perceptron", linear=False,
             params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, rehearsal={"max_iter": 2},
         ),
         _estimator(
-            "extra-trees", "Extremely randomised trees", BOTH, "nonlinear:extra_trees", linear=False,
+            "extra-trees", "Extremely randomised trees", BOTH, "models:extra_trees", linear=False,
             params={"n_estimators": 200, "min_samples_leaf": 2}, rehearsal={"n_estimators": 2},
         ),
         *(
             _estimator(
                 "forest" if trees == TREES[0] else f"forest-{trees}", f"Random forest of {trees} trees", BOTH,
-                "nonlinear:forest", linear=False, rehearsal={"n_estimators": 2},
+                "models:forest", linear=False, rehearsal={"n_estimators": 2},
                 params={"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1},
             )
             for trees in TREES

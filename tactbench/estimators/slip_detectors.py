@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.estimators.nonlinear import EveryNth
+from tactbench.estimators.models import EveryNth
 from tactbench.plugin import FloatArray, NotApplicable, StreamReadings
 
 LEVELS = 5

@@ -1,8 +1,8 @@
-"""Tasks: detect the times at which the contact begins to slip, from all streams of a sensor or its taxels alone."""
+"""Tasks: when the contact begins to slip, in which state of slip each frame is, and if a whole recording has a slip."""
 
 from __future__ import annotations
 
-from tactbench.plugin import AlarmPolicy, SlipTarget, Summary, TaskDescriptor, TaskSpec, hookimpl
+from tactbench.plugin import AlarmPolicy, LabelTarget, SlipTarget, Summary, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks.slip_scenes import SLIP_SCENES
 
 TACTBENCH_API = 2
@@ -59,8 +59,47 @@ TAXELS = SPEC.model_copy(
     }
 )
 
+STATE = TaskSpec(
+    name="slip-state",
+    title="State of slip",
+    question="Does the contact stick, slip in part, or slip as a whole?",
+    kind="classification",
+    optional_features=("dc_pressure", "ac_pressure"),
+    target=SlipTarget(hop_s=0.02, window_s=0.1),
+    answer_per="frame",
+    # The level too: partial slip is a matter of forces, not of motion alone.
+    summaries=(*(Summary(measure=measure) for measure in ("mean", "change", "mean-step", "range")), BAND),
+    metric="balanced_accuracy",
+    equivalence=0.02,  # assumed: two frames in a hundred
+    scenes=SLIP_SCENES,
+    protocols=("deployable", "deployable-untared"),
+    splits=("roles", "session"),
+    estimators=("forest-50", "logistic"),
+    baselines=("majority", "chance"),
+    replicates=1,
+)
+
+SEQUENCE = TaskSpec(
+    name="slip-sequence",
+    title="Slip in a recording",
+    question="Did the object slip during the recording?",
+    kind="classification",
+    target=LabelTarget(name="slip"),
+    answer_per="recording",
+    # Measures of change; levels are left out: the rest level of a channel may reveal the session.
+    summaries=tuple(Summary(measure=measure) for measure in ("deviation", "mean-step", "change", "range")),
+    metric="accuracy",
+    equivalence=0.01,  # assumed: one answer in a hundred
+    protocols=("deployable", "deployable-untared"),
+    # The strictest that the recordings have labels for: objects never shown, another occasion, blocks of neighbouring
+    # recordings; else recordings alone.
+    splits=("object", "session", "roles", "block", "recording", "shuffled"),
+    estimators=("forest", "svm", "logistic"),
+    baselines=("majority", "chance"),
+)
+
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Return the descriptors of the slip detection tasks."""
-    return [TaskDescriptor(spec=SPEC), TaskDescriptor(spec=TAXELS)]
+    """Return the descriptors of the slip tasks."""
+    return [TaskDescriptor(spec=one) for one in (SPEC, TAXELS, STATE, SEQUENCE)]

@@ -18,7 +18,7 @@ WHERE = {"driver": f"{HERE}:TalkingDriver", "emulator": f"{HERE}:build_emulator"
 def tactbench_sensors():
     pad = SPEC.model_copy(update={"name": "pad"})
     return [
-        SensorDescriptor(spec=pad, transducer="tactbench.sensors.ideal.transduction:build", **WHERE),
+        SensorDescriptor(spec=pad, transducer="tactbench.sensors.ideal:build", **WHERE),
         SensorDescriptor(spec=pad.model_copy(update={"name": "mute"})),
     ]
 

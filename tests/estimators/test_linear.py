@@ -60,7 +60,7 @@ def test_trivial_answers_are_trivial():
 
 
 def test_a_discriminant_of_classes_with_one_mean_says_nothing_aloud():
-    from tactbench.estimators.linear import discriminant
+    from tactbench.estimators.models import discriminant
 
     X = np.tile(np.eye(3), (4, 1))
     y = np.repeat([0, 1], 6)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.rigs.twin.contact.layer import compliance_shape
+from tactbench.rigs.twin.contact.media import compliance_shape
 
 NEAR = 48
 """Cells up to which Love's closed form is used: beyond, its cancellation costs more than the series."""

@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.rigs.twin.contact.newton import NewtonSolver, Solution
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.contact.tangential import dragged_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tests.oracles.boundary_elements import Layer, paraboloid_mm, pressed

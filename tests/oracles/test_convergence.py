@@ -11,12 +11,12 @@ import pytest
 from tactbench.plugin import load_object
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import DEFAULT
-from tactbench.sensors.biotac.spec import SPEC as BIOTAC
-from tactbench.sensors.icub.spec import SPEC as ICUB
+from tactbench.sensors.biotac import SPEC as BIOTAC
+from tactbench.sensors.icub import SPEC as ICUB
 
 LOADS = np.array([0.25, 0.8, 1.6, 3.0, 5.0])
 

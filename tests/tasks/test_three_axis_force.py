@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactbench.plugin import Block, ChannelSpec, StreamSpec
-from tactbench.tasks.three_axis_force import SPEC
+from tactbench.tasks.force import THREE_AXIS as SPEC
 from tests.core.evaluation.made import evaluated, sensor, write
 
 LOAD_CELL = StreamSpec(

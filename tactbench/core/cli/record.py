@@ -17,7 +17,7 @@ from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.plugins.interfaces import Acquisition, RecordingRequest, Rig
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.plugins.rigs import load_rig_file, rig_of
-from tactbench.core.provenance.gather import gather
+from tactbench.core.provenance import gather
 from tactbench.core.recording.image import require_free
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.samples import Block

@@ -110,7 +110,7 @@ def build_table(
     rows
         Rows of one folder or of several, in any order.
     provenance
-        Versions, machine and commit of the runs; see `tactbench.core.provenance.gather`.
+        Versions, machine and commit of the runs; see `tactbench.core.provenance`.
     questions
         Questions of the tasks, by name of the task.
     """

@@ -29,7 +29,7 @@ from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
 from tactbench.core.pool import Engine, Limits, Pool, preload
 from tactbench.core.pool.child import plain_error
-from tactbench.core.provenance.source import ANSWERING, sources_of, versions
+from tactbench.core.provenance import ANSWERING, sources_of, versions
 from tactbench.core.thread_limit import VARIABLES
 
 CONNECT_S = 10.0

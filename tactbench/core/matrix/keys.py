@@ -15,7 +15,7 @@ from typing import Any
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rigs import taking_part
-from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, identity_of, sources_of, versions
+from tactbench.core.provenance import ANSWERING, RECORDING, digest_of, identity_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import TaskSpec

@@ -18,14 +18,13 @@ nowhere = os.open(os.devnull, os.O_WRONLY)
 for stream in (1, 2):
     os.dup2(nowhere, stream)
 
-for library in ("h5py", "scipy.linalg", "scipy.signal", "tactbench.core.acquisition"):
+LIBRARIES = ("h5py", "scipy.linalg", "scipy.signal", "scipy.special", "threadpoolctl")
+for library in (*LIBRARIES, "tactbench.core.acquisition", "tactbench.core.evaluation.cell"):
     import_module(library)
 
-from tactbench.core.evaluation.warm_up import import_libraries  # noqa: E402
 from tactbench.core.matrix.solve import prepare  # noqa: E402
 from tactbench.core.plugins.registry import load_object, load_registry  # noqa: E402
 
-import_libraries()
 _ours = load_registry([point for point in entry_points(group="tactbench") if point.module.startswith("tactbench.")])
 for estimator in _ours.estimators:
     for kind in estimator.kinds:

@@ -31,7 +31,7 @@ from tactbench.core.plugins.registry import Family, Registry, installed
 from tactbench.core.plugins.rigs import rig_of, taking_part
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
 from tactbench.core.progress import Progress
-from tactbench.core.provenance.gather import gather, usable_cores
+from tactbench.core.provenance import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.row import STOPPED
 from tactbench.core.spec.task import TaskSpec

@@ -6,6 +6,7 @@ import json
 import os
 import random
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -14,17 +15,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import ALIKE, Cell
-from tactbench.core.matrix.store.store import signature
+from tactbench.core.matrix.store import signature
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
-from tactbench.core.provenance.gather import host_id
+from tactbench.core.provenance import host_id
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.thread_limit import thread_limit
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
+    from tactbench.core.plugins.interfaces import Estimator
     from tactbench.core.samples import Answers
 
 Row = dict[str, Any]
@@ -58,13 +61,29 @@ def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
         params = {**estimator.params, **(estimator.rehearsal or {})}
         made = load_object(estimator.where)(kind=kind, seed=0, threads=1, **params)
         if estimator.rehearsal is not None:
-            from tactbench.core.evaluation.warm_up import rehearse
-
             rehearse(made, kind)
 
 
 _prepared: set[tuple[int, str, str]] = set()
 """Prepared (process, estimator, kind); by process, since memory pages are copied at first use after a fork."""
+
+
+def rehearse(estimator: Estimator, kind: str) -> None:
+    """Fit `estimator` to a few random rows for a task of this kind and predict, with one thread.
+
+    Libraries delay some work (finding other libraries, generating code) until the first fit, where it takes some
+    tenths of a second. Processes forked afterwards need not repeat this work.
+    """
+    import numpy as np
+
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(40, 3))
+    y = np.arange(len(X)) % 2 if kind != "regression" else X[:, 0] + rng.normal(size=len(X))
+    with warnings.catch_warnings(), np.errstate(all="ignore"), thread_limit(1):
+        warnings.simplefilter("ignore")
+        estimator.fit(X, y)
+        estimator.predict(X)
+        estimator.predict(X[:1])
 
 
 def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplete: bool = False) -> Dataset:

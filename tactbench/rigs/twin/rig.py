@@ -31,8 +31,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin, forget_tables
 from tactbench.rigs.twin.geometry import shape_of
-from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
+from tactbench.rigs.twin.planner import Plan, carried_out, commanded_place_mm, handled, plan_scene
 from tactbench.rigs.twin.synthesis import Synthesis
 
 _CURVE_POINTS = 4001

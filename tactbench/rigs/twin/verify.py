@@ -14,12 +14,12 @@ import numpy as np
 from tactbench.plugin import FloatArray, PlanEntry, Quantity, Scene, SensorDescriptor, assumed, load_registry
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, Verdict, rig_context
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of, press_of
+from tactbench.rigs.twin.contact.stages import medium_of, press_of
 from tactbench.rigs.twin.effects.heat import HeatedCore
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive, Mode
 from tactbench.rigs.twin.geometry import Contact, skin_grid
-from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.planner import carried_out, prepare
 from tactbench.rigs.twin.rig import Twin, build
 from tactbench.rigs.twin.synthesis import DEFAULT
 

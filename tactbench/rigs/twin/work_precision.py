@@ -22,10 +22,8 @@ from tactbench.plugin import (
     load_registry,
 )
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
-from tactbench.rigs.twin.contact.pressing import pressed
-from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
-from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.contact.stages import forget_tables, pressed, read_names, skin_under_load
+from tactbench.rigs.twin.planner import Plan, carried_out, plan_scene, prepare
 from tactbench.rigs.twin.synthesis import RUNGS
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)

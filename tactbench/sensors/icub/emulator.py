@@ -27,6 +27,7 @@ from tactbench.plugin.devices import (
     fault_concerns,
     read_options,
 )
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
     BROADCAST,
@@ -45,8 +46,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
     version_frame,
 )
-from tactbench.sensors.icub.options import FingertipOptions
-from tactbench.sensors.icub.spec import STREAMS
+from tactbench.sensors.icub.driver import FingertipOptions
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
 """Version of the emulated board: an MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from tactbench.plugin import DataError, Source, UsageError
-from tactbench.plugin.devices import CanFrame, DeviceLog, read_can_log, read_options
+from tactbench.plugin.devices import CanFrame, DeviceLog, Options, read_can_log, read_options
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     HEAD,
@@ -21,8 +23,17 @@ from tactbench.sensors.icub.codec import (
     read_command,
     to_block,
 )
-from tactbench.sensors.icub.options import LogOptions
-from tactbench.sensors.icub.spec import STREAMS
+
+
+class LogOptions(Options):
+    """Options of the log reader: the fingertip's board and triangle, and whether early firmware was in use."""
+
+    board: int | None = Field(default=None, ge=0, le=14)
+    """Number of the board; None: the only board in the log."""
+    triangle: int | None = Field(default=None, ge=0, le=15)
+    """Number of the fingertip's triangle on the board; None: the only triangle in the log."""
+    old_ids: bool = False
+    """Accept frames of class 3, too, which early firmware sends, but other analog sensors as well."""
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
@@ -31,7 +42,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     Times count from the log's first message. Samples equal those of the driver from the same frames; a sample that is
     not later than the previous one is left out and counted. Several buses in one log are not distinguished.
 
-    Options are those of :class:`~tactbench.sensors.icub.options.LogOptions`.
+    Options are those of :class:`LogOptions`.
 
     Raises
     ------

@@ -6,7 +6,7 @@ import sys
 
 SCRIPT = """
 import psutil
-from tactbench.core.evaluation.warm_up import rehearse
+from tactbench.core.matrix.solve import rehearse
 from tactbench.core.plugins.registry import installed, load_object
 
 rehearsed = [(one, kind) for one in installed().estimators if one.rehearsal is not None for kind in one.kinds]

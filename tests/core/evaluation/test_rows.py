@@ -20,7 +20,7 @@ from tactbench.core.evaluation.folds import PLAIN
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.plugin import Summary
-from tactbench.tasks import slip, slip_state
+from tactbench.tasks import slip
 
 from . import made_slip, test_per_recording, test_vectors
 from .made import evaluated, force_task, grasps, held, label_task, ramp, record, roles, sessions
@@ -105,7 +105,7 @@ CELLS = {
     "slips": lambda folder: slips(folder, slip.SPEC, "pac-band"),
     "slips by session": lambda folder: slips(folder, slip.SPEC, "frame-difference", 1.25, 1.2, split="session"),
     "oracle of slips": lambda folder: slips(folder, slip.SPEC, "force-ratio"),
-    "states": lambda folder: slips(folder, slip_state.SPEC, "knn"),
+    "states": lambda folder: slips(folder, slip.STATE, "knn"),
     "of the caller": own,
 }
 

@@ -11,9 +11,8 @@ from dataclasses import fields
 import pytest
 
 from tactbench.core.errors import FolderError, FormatError
-from tactbench.core.matrix.store import Store
-from tactbench.core.matrix.store import store as STORE
-from tactbench.core.matrix.store.cell_file import CellFile, read_cell
+from tactbench.core.matrix import store as STORE
+from tactbench.core.matrix.store import CellFile, Store, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 

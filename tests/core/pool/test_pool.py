@@ -9,8 +9,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tactbench.core import pool
 from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
-from tactbench.core.pool import InProcess, Limits, Pool, pool
+from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.pool.child import resident_mb
 from tests.conftest import ROOT
 from tests.core.pool.patience import ending, gone, until
@@ -171,8 +172,7 @@ def test_an_iteration_given_up_ends_everybody(tmp_path):
 
 OWNER = """
 import multiprocessing, sys
-from tactbench.core.pool import Pool
-from tactbench.core.pool.pool import _context
+from tactbench.core.pool import Pool, _context
 from tests.core.pool.works import work
 if sys.argv[1] != "default":
     multiprocessing.set_start_method(sys.argv[1])

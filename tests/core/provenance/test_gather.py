@@ -11,8 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 from tactbench.core.plugins.registry import installed, load_registry
-from tactbench.core.provenance.gather import _commit, cpu_model, gather, host_id, usable_cores
-from tactbench.core.provenance.source import source_digest
+from tactbench.core.provenance import _commit, cpu_model, gather, host_id, source_digest, usable_cores
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_acme
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sklearn.linear_model import Ridge
 
-from tactbench.core.provenance.source import ANSWERING, RECORDING, identity_of, source_digest, sources_of, versions
+from tactbench.core.provenance import ANSWERING, RECORDING, identity_of, source_digest, sources_of, versions
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_package
 
@@ -30,7 +30,7 @@ def digest(module="some_plugin.anything:at_all", own=()):
 
 def test_every_byte_of_the_package_counts_but_for_byte_code_hidden_files_and_verbs(package, monkeypatch):
     """A recording of the twin was made anew since a verb about devices had changed."""
-    monkeypatch.setattr("tactbench.core.provenance.source.PACKAGE", "some_plugin")
+    monkeypatch.setattr("tactbench.core.provenance.PACKAGE", "some_plugin")
     before = source_digest("some_plugin")
     uncounted = (
         "__pycache__/law.cpython-311.pyc",

@@ -9,8 +9,8 @@ from tactbench.plugin import load_registry
 from tactbench.plugin.simulation import FluidBackedShell, SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press, check_reach, remarks
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
 
 BALANCE = 1e-8

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
+from tactbench.rigs.twin.contact.media import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
 from tests.hard.families.contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins
 

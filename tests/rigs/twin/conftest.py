@@ -14,14 +14,14 @@ from tactbench.plugin import PlanEntry, Quantity, RigContext, Scene, SensorDescr
 from tactbench.plugin.simulation import Environment, SheetTable
 from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.planner import carried_out
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.synthesis import Synthesis
-from tactbench.sensors.biotac.spec import SPEC as BIOTAC
-from tactbench.sensors.icub.spec import SPEC as ICUB
+from tactbench.sensors.biotac import SPEC as BIOTAC
+from tactbench.sensors.icub import SPEC as ICUB
 
 SPECS = {"biotac": BIOTAC, "icub": ICUB}
 EFFECTS = tuple(tactbench_effects())

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from tactbench.plugin import ForceRamp, Indenter, Scene, SensorDescriptor
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.planner import carried_out
 from tactbench.rigs.twin.synthesis import DEFAULT, FINE, Fidelity
 from tests.rigs.twin.conftest import TWIN, q
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from tactbench.rigs.twin.contact.layer import compliance_shape, shear_shapes
+from tactbench.rigs.twin.contact.media import compliance_shape, shear_shapes
 
 
 @given(st.floats(0, 0.5), st.floats(20, 400))

@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, Placement, Scene, load_registry
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.planner import carried_out
 from tactbench.rigs.twin.verify import omitted
 from tests.rigs.twin.conftest import TWIN, named, q, unrounded
 

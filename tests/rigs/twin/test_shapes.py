@@ -17,7 +17,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet, Slide
 from tactbench.rigs.twin.contact.press import Press, remarks
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, Shape, check_contact, gap_mm, shape_of, skin_grid
 from tactbench.sensors.ideal import tactbench_sensors
 from tests.rigs.twin.conftest import TWIN, q

@@ -8,7 +8,7 @@ import pytest
 
 from tactbench.core.spec.scene import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
-from tactbench.rigs.twin.preparation import MOST_SAMPLES, check_numbers
+from tactbench.rigs.twin.planner import MOST_SAMPLES, check_numbers
 from tests.rigs.twin.conftest import TWIN, q
 
 

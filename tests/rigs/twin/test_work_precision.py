@@ -13,7 +13,7 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
 from tactbench.rigs.twin import work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.planner import prepare
 from tactbench.rigs.twin.synthesis import RUNGS
 from tests.conftest import THIRD_PARTY
 from tests.rigs.twin.conftest import TWIN, q

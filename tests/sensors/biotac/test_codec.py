@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.codec import (
     INDEX,
     PROPERTIES,
@@ -19,7 +20,6 @@ from tactbench.sensors.biotac.codec import (
     with_parity,
 )
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
-from tactbench.sensors.biotac.spec import SPEC
 
 
 def rows(table, width):

@@ -16,11 +16,11 @@ from tactbench.plugin.devices import (
     SpiLink,
     SpiReply,
 )
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.codec import CHANNELS
 from tactbench.sensors.biotac.driver import BioTacDriver
 from tactbench.sensors.biotac.emulator import BioTacFault, Emulator, build_emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
-from tactbench.sensors.biotac.spec import SPEC
 
 SERIAL = {
     "serial number": "BT-2P-02.2.0-B-11-E-0004",

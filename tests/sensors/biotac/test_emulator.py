@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin import UsageError
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.codec import INDEX, decoded, sampling_command
 from tactbench.sensors.biotac.emulator import REST, BioTacFault, Emulator
-from tactbench.sensors.biotac.spec import SPEC
 
 COUNTS = {**REST, "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
 WORD_S = 2 * 8 / 4.4e6

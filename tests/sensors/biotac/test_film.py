@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from tactbench.sensors.biotac import SKIN
 from tactbench.sensors.biotac.channels import ELECTRODES
 from tactbench.sensors.biotac.conduction import faces_between
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM, core_reach_mm
-from tactbench.sensors.biotac.spec import SKIN
 from tactbench.sensors.biotac.transduction import mid_film_mm, spectral_interpolation
 
 OUTER, DOME = SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm")

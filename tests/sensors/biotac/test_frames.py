@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import Quality
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.codec import CHANNELS, Fault, encoded
 from tactbench.sensors.biotac.emulator import BioTacFault, Emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches
-from tactbench.sensors.biotac.spec import SPEC
 
 SPEED_HZ = 4_400_000
 PERIOD_S = 1 / 4400

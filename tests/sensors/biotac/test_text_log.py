@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import DataError, Quality, UsageError
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.codec import INDEX, encoded, parity_holds
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches
-from tactbench.sensors.biotac.spec import SPEC
 from tactbench.sensors.biotac.text_log import read_log
 
 ROTATED = tuple(name for pair in zip(DEFAULT_FRAME[1::2], DEFAULT_FRAME[::2], strict=True) for name in pair)

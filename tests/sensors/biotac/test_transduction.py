@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import RigError
+from tactbench.sensors.biotac import SPEC
 from tactbench.sensors.biotac.channels import ELECTRODES, NAMES
-from tactbench.sensors.biotac.spec import SPEC
 from tactbench.sensors.biotac.transduction import Electrodes, build
 from tests.sensors.skin_states import dent, grid_of, state_of
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from tactbench.plugin import Block
 from tactbench.plugin.devices import CanFrame, CanLink, DriverSettings, EmulatorSettings
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.driver import FingertipDriver
 from tactbench.sensors.icub.emulator import build_emulator
-from tactbench.sensors.icub.spec import STREAMS
 
 NAMES = [channel.name for channel in STREAMS[0].channels]
 

@@ -13,6 +13,7 @@ from tactbench.plugin.devices import (
     DriverSettings,
     LinkError,
 )
+from tactbench.sensors.icub import STREAMS
 from tactbench.sensors.icub.codec import (
     BoardSetup,
     OldSetup,
@@ -24,7 +25,6 @@ from tactbench.sensors.icub.codec import (
 )
 from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver
 from tactbench.sensors.icub.emulator import BoardFault
-from tactbench.sensors.icub.spec import STREAMS
 from tests.sensors.icub.emulated import (
     NAMES,
     VirtualLink,

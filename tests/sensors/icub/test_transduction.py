@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.sensors.biotac.spec import SPEC as BIOTAC
-from tactbench.sensors.icub.spec import SPEC
+from tactbench.sensors.biotac import SPEC as BIOTAC
+from tactbench.sensors.icub import SPEC
 from tactbench.sensors.icub.transduction import build, taxel_weight
 from tests.sensors.skin_states import dent, grid_of, state_of
 

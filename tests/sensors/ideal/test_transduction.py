@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.sensors.ideal import SPEC
-from tactbench.sensors.ideal.transduction import build
+from tactbench.sensors.ideal import SPEC, build
 from tests.sensors.skin_states import dent, grid_of, state_of
 
 NAMES = [channel.name for channel in SPEC.channels("taxel")]

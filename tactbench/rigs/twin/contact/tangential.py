@@ -31,8 +31,8 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, Skin, SkinGrid, SkinState
-from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.load_table import Interpolant, LoadTable
+from tactbench.rigs.twin.contact.media import shear_shapes
 from tactbench.rigs.twin.contact.press import AnyPress
 
 Direction = tuple[float, float]

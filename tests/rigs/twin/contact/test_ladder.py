@@ -10,7 +10,7 @@ import pytest
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.rigs.twin.contact.press import LocalPress
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tests.oracles.layers import bonded_layer
 from tests.rigs.twin.conftest import SILENT, TWIN, q

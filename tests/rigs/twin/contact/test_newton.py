@@ -10,8 +10,8 @@ import pytest
 from tactbench.plugin import RigError, assumed
 from tactbench.rigs.twin.contact import newton, shell
 from tactbench.rigs.twin.contact.newton import NewtonSolver
-from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.shell import with_core
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tests.rigs.twin.conftest import SPECS
 

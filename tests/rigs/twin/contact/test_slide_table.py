@@ -21,7 +21,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, Slide
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.contact.tangential import (
     build_slide_table,
     dragged_state,

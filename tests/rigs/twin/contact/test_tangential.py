@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.rigs.twin.contact.layer import shear_shapes
+from tactbench.rigs.twin.contact.media import shear_shapes
 from tactbench.rigs.twin.contact.press import Press, at_rest
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.contact.tangential import (
     dragged_state,
     pressed_state,

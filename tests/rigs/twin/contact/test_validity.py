@@ -9,7 +9,7 @@ import pytest
 
 from tactbench.plugin import RigError
 from tactbench.rigs.twin.contact.press import remarks
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.geometry import Contact, skin_grid
 from tests.hard.families.contact import press_of
 from tests.rigs.twin.conftest import SPECS

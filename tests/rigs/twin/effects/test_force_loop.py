@@ -9,7 +9,7 @@ from tactbench.core.spec.scene import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, Scene
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, force_at_depth
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.planner import prepare
 from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
 CAP = Indenter(radius=q(10.0))

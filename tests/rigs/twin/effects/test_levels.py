@@ -10,8 +10,7 @@ from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.effects import creep
 from tactbench.rigs.twin.effects.channels import gain, offset, rest_spread, smooth_basis, unit_rest
 from tactbench.rigs.twin.effects.memory import lag
-from tactbench.rigs.twin.planner import plan_scene
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.planner import plan_scene, prepare
 from tactbench.sensors.biotac.channels import ELECTRODES
 from tests.rigs.twin.conftest import EFFECTS
 

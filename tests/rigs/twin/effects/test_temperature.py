@@ -9,12 +9,11 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.contact.press import at_rest
-from tactbench.rigs.twin.contact.pressing import medium_of
+from tactbench.rigs.twin.contact.stages import medium_of
 from tactbench.rigs.twin.effects.heat import HeatedCore, Thermistor, through_divider
 from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 from tactbench.rigs.twin.geometry import skin_grid
-from tactbench.rigs.twin.planner import plan_scene
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.planner import plan_scene, prepare
 from tactbench.sensors.biotac.transduction import build
 from tests.rigs.twin.conftest import EFFECTS, named, q, unrounded
 

@@ -1,4 +1,4 @@
-"""Task: identify the grasped object from taxels, with one prediction for each frame."""
+"""Tasks on grasped objects: if one will slip, from a static reading before the lift, and which it is, by each frame."""
 
 from __future__ import annotations
 
@@ -6,7 +6,21 @@ from tactbench.plugin import LabelTarget, TaskDescriptor, TaskSpec, hookimpl
 
 TACTBENCH_API = 2
 
-SPEC = TaskSpec(
+STABILITY = TaskSpec(
+    name="grasp-stability",
+    title="Grasp stability",
+    question="Will the object slip when it is lifted?",
+    kind="classification",
+    target=LabelTarget(name="slipped"),
+    metric="accuracy",
+    equivalence=0.01,  # assumed: one answer in a hundred
+    protocols=("deployable",),
+    splits=("object", "session", "roles", "shuffled"),
+    estimators=("forest",),
+    baselines=("majority", "chance"),
+)
+
+IDENTITY = TaskSpec(
     name="object-identity",
     title="Identity of the object",
     question="Which object has the hand closed on?",
@@ -26,5 +40,5 @@ SPEC = TaskSpec(
 
 @hookimpl
 def tactbench_tasks() -> list[TaskDescriptor]:
-    """Return the descriptor of the object identity task."""
-    return [TaskDescriptor(spec=SPEC)]
+    """Return the descriptors of the tasks on grasped objects."""
+    return [TaskDescriptor(spec=STABILITY), TaskDescriptor(spec=IDENTITY)]
