@@ -44,12 +44,12 @@ def acquire(
         completed: it stops the parts, and returns a text about any work left for the operator.
     clock
         Monotonic clock [s]; its difference over the scene, without writing the file, is ``provenance["sim_s"]`` of a
-        simulated rig and ``provenance["acquisition_s"]`` of others.
+        simulated rig and ``provenance["acquisition_s"]`` of other rigs.
     opened, watch
         Called with the acquisition before its first block, and with every block once it is written.
     complete_interrupted
         Whether an interrupted recording of a real rig is completed, excluded from every evaluation, before the error
-        goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. An
+        is raised. Otherwise its journal stays, and the error names the command that makes a recording of it. An
         interrupted simulation leaves no file.
 
     Raises
@@ -226,7 +226,7 @@ def _meta(acquisition: Acquisition, request: RecordingRequest) -> RecordingMeta:
 
 
 MOVED = 0.2
-"""Share of the force's range: a sensor is frozen if its readings are constant while the force changes by more than it
+"""Share of the force's range: a sensor is frozen if its readings are constant while the force changes by a larger share
 (assumed; a force sensor's noise is less, and a sensor that is not pressed need not change)."""
 
 
@@ -246,8 +246,8 @@ class Completeness:
         self._sensor = [stream.name for stream in sensor]
         self._specs = {stream.name: stream for stream in (*sensor, *reference)}
         self._rows: dict[str, list[IntArray]] = {name: [] for name in self._specs}
-        """Of each block, for its rows with a sample: the times of the rows [ns], the times of the rows before [ns], and
-        1 where the samples differ from those of the row before, (3, n)."""
+        """By stream and block, for each row with a sample: its time, the time of the previous row [ns], and 1 if the
+        sample differs from that of the previous row, (3, n)."""
         self._last: dict[str, tuple[int, Array]] = {}
         self._force: list[tuple[int, float]] = []
         self._times_ns: list[int] = []
@@ -306,13 +306,13 @@ class Completeness:
                 yield f"{name}: {lost} of {due} rows lost"
 
     def _kept(self, *names: str) -> IntArray:
-        """Return the rows of some streams as `_rows` describes them, in order of time, (3, n)."""
+        """Return times, previous times [ns] and changes (0 or 1) of rows of some streams, in order of time, (3, n)."""
         blocks = (block for name in names for block in self._rows[name])
         rows = np.concatenate([np.empty((3, 0), dtype=np.int64), *blocks], axis=1)
         return rows[:, np.argsort(rows[0], kind="stable")]
 
     def _frozen(self, name: str, changes: int, from_ns: int, to_ns: int) -> bool:
-        """Return True if a sensor is constant while the force changes, or a usually changing force sensor is."""
+        """Return True if a sensor is constant while the force varies, or a usually varying force sensor is constant."""
         if name in self._sensor:
             every = [value for _, value in self._force]
             within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]

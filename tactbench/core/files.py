@@ -68,9 +68,9 @@ def replace_file(
 ) -> None:
     """Write `content` to a temporary file and rename it to `path`: readers see either the old or the new file.
 
-    The temporary file is `aside`, in the same folder, or hidden (None); after an error, it does not remain. `check` is
-    called with its path before the renaming, which its errors prevent. With `sync`, the disk has stored the file when
-    the function returns. Raises OSError if the folder cannot be written.
+    The temporary file is `aside`, in the same folder, or hidden (None), and is removed after an error. `check` is
+    called with its path before the renaming; if `check` raises an error, no file is renamed. With `sync`, the disk has
+    stored the file when the function returns. Raises OSError if the folder cannot be written.
     """
     aside = aside or path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:

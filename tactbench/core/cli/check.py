@@ -32,7 +32,7 @@ def command(
 ) -> None:
     """Check that a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter, profile or data set.
 
-    NAME is that of a component, a mapping file, or a plugin with all its components. No device is
+    NAME is the name of a component, a mapping file, or a plugin with all its components. No device is
     opened and nothing moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     if listed:
@@ -53,7 +53,7 @@ def command(
         subjects = []
         remark(error.message)
     if recording is not None and not wrong and all(one.kind != "sensor" for one in subjects):
-        raise UsageError(f"--recording is for sensors; {name} is none.", hint="Leave out --recording.")
+        raise UsageError(f"--recording is for sensors only, and {name} is not a sensor.", hint="Leave out --recording.")
     reports = [run_checks(one, recording=recording, root=root) for one in subjects]
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))

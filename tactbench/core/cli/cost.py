@@ -108,7 +108,7 @@ def _show_knobs(
 
 
 def _show_twin(sensors: Sequence[str], out: Path, shape: str, rounds: int) -> None:
-    """Measure errors and times of the simulated rig for `sensors` (default: the matrix's), in `rounds` rounds.
+    """Measure errors and times of the simulated rig for `sensors` (default: those of the matrix), in `rounds` rounds.
 
     The table is printed in the format `shape`; table and figure are written into the folder `out`.
     """

@@ -92,7 +92,7 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
         with code_of("where", subject):
             rig = subject.code("where")(rig_context(subject.registry))
     else:
-        skip("the rig moves real devices, or replays")
+        skip("the rig moves real devices, or replays recordings")
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     scene = tiny_scene(end_n=end_n, observe=("taxel",) if "taxel" in kinds else kinds)
     with code_of("spec" if subject.kind == "sensor" else "where", subject):

@@ -61,7 +61,7 @@ def names_are_known(subject: Subject) -> None:
 
 @check("task")
 def metric_has_its_unit(subject: Subject) -> None:
-    """A task's metric is one of its kind, and its unit, a label beside every score, is the one that the metric has.
+    """A task's metric must suit the kind of task, and the unit shown beside its scores must be that of the metric.
 
     For errors (rmse, mae, mean_euclidean_error), which are not converted, state the target's unit; else state 1.
     """

@@ -232,7 +232,7 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     columns = np.array([channel_on(recording, one, clock) for one in _CHANNELS])
     whole = ~np.isnan(columns).any(axis=0)
     if not whole.all():
-        counts["samples of the reference left out because a channel has none"] += int((~whole).sum())
+        counts["samples of the reference left out because a channel has no sample"] += int((~whole).sum())
     normal, tangential, slip = columns[:, whole]
     t_ns = clock.t_ns[whole] - first_ns
     try:

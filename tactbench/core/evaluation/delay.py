@@ -54,7 +54,7 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
     dict, str
         ``sampling``: one sampling interval of the slowest stream used, the longest time from a change to the next
         sample. The interval is that of the sensor's own rate if the rig states one, else the longer one of the stated
-        rate and the recorded times. For frames, the step between frames if that is longer.
+        rate and the recorded times. For frames, the step between frames if the step is longer.
         ``link``: the link delay that the sensor's spec states.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
         samples has linear phase of slope (n - 1) / 2; Oppenheim and Schafer, Discrete-Time Signal Processing, section
@@ -91,7 +91,7 @@ def stated_delay_ms(data: TaskData, estimator: EstimatorDescriptor, k: int) -> t
 
 
 def _wait_s(table: Table, features: Sequence[str], rules: ProtocolSpec) -> float | None:
-    """Return the longest sampling interval [s] of the streams with features; None if that of a stream is unknown."""
+    """Return the longest sampling interval [s] of the streams with features; None if an interval is unknown."""
     by_clock = {one.stream: 1.0 / one.rate_hz for one in table.readings if one.rate_hz}
     waits = []
     for place, stream in enumerate(_used(table.meta, features)):
@@ -104,7 +104,7 @@ def _wait_s(table: Table, features: Sequence[str], rules: ProtocolSpec) -> float
 
 
 def _step_s(table: Table) -> float:
-    """Return the median interval [s] between rows; 0 without a clock, or where rows are single readings."""
+    """Return the median interval [s] between rows; 0 without a clock, or if the interval exceeds `SLOWEST_S`."""
     timed = table.meta.clock != "none" and len(table.time_s) > 1
     step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
     return step_s if step_s <= SLOWEST_S else 0.0
@@ -181,7 +181,7 @@ def calls_s(
 ) -> FloatArray:
     """Return the (calls,) durations [s] of ``work`` called with items of a sequence.
 
-    From 20 to `at_most` calls are made, and no further ones after 0.3 s; one call before is not counted. Items are
+    20 calls are made, and more, up to `at_most`, while they take under 0.3 s; a first call is not counted. Items are
     spread over the sequence because a model may answer some rows faster than others.
     """
     places = np.linspace(0, len(given) - 1, at_most).astype(int)

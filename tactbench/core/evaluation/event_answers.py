@@ -22,7 +22,7 @@ class Scored(ScoredRecording):
     place: int
     """Index of the recording in the data set."""
     threshold: float = np.inf
-    """The fold's threshold, from which on a frame is active."""
+    """Threshold of the fold: frames with this score or a higher score are active."""
 
 
 @dataclass(frozen=True)

@@ -190,13 +190,13 @@ class Configured:
     params: Mapping[str, Any]
     """Parameters set by the user, which are not searched."""
     fit_params: Mapping[str, Callable[[Part], Any]]
-    """Further arguments of the estimator's ``fit``: by name, the function from a training set to the argument."""
+    """Functions that compute further arguments of the estimator's ``fit`` from a training set, by argument name."""
     metric: Metric
     events: EventRules | None
-    """Rules for alarms, of an event detection task."""
+    """Rules for alarms in an event detection task; None for other tasks."""
     clock: Clock
     counts: Counter[str]
-    """Counts of rows left out and of fits with a warning, which are added to."""
+    """Running counts of rows left out and of fits with a warning."""
 
     def answers_to(self, part: Part, model: Estimator, n_classes: int) -> npt.NDArray[Any]:
         """Return the predictions of `model` for the rows of a set, checked by :func:`answers`."""
@@ -310,7 +310,7 @@ def fitted_fold(estimator: Configured, data: TaskData, assignment: Assignment) -
 
 
 def answered_fold(estimator: Configured, data: TaskData, fitted: FittedFold, number: int) -> AnsweredFold:
-    """Compute and score a model's answers to its fold; keep those to validation and training rows of a single fold."""
+    """Compute and score a model's answers to its fold; answers to non-test rows are kept only for a single fold."""
     fold, made, rules = fitted.fold, data.data, estimator.events
     n_classes = 0 if rules else len(made.classes)
     single = len(data.assignments) == 1

@@ -1,4 +1,4 @@
-"""Units that a split holds out (sessions, objects, placements …): the interval of a score over them, and their sums.
+"""Interval of a score over units that a split holds out (sessions, objects …), and the sums over each unit.
 
 The sums over each unit are kept in a result, to compare scores later without the answers::
 
@@ -266,7 +266,7 @@ def summed(
     held: FloatArray | None = None,
     truth: FloatArray | None = None,
 ) -> dict[str, Any]:
-    """Return the sums described above, for the replicates in `unit`.
+    """Return the sums that the module's docstring describes, for the replicates in `unit`.
 
     `held` has the (replicates, 2) sums over unloaded holds, and `truth` the (n,) true force [N], if these are known.
     """
@@ -302,7 +302,7 @@ def _plain(scores: FloatArray) -> list[float | None]:
 def tables_of(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
     """Return the (rows, replicates, m) sums that :func:`summed` wrote, for rows with the same names of replicates.
 
-    With the name of :data:`EXCESS`, squares and degrees of freedom of the unloaded holds follow those of the errors.
+    For the metric :data:`EXCESS`, squares and degrees of freedom of the unloaded holds follow those of the errors.
     """
     if not n_classes:
         dense = np.array([one["sums"] for one in several], dtype=np.float64)

@@ -30,7 +30,7 @@ class ProtocolSpec(Frozen):
     roles_only: bool = False
     """True to require recordings with the roles train, validation and test, and split by these roles."""
     first_row_only: bool = False
-    """Keep only the first row of every recording, to test recordings for leaks, not sensors: with every task."""
+    """Keep only the first row of every recording, to test recordings, not sensors, for leaks; for all tasks."""
     every: int = 1
     """N to keep only each N-th sample from the first, as from a sensor with an N times lower sampling rate."""
     k: int | None = None

@@ -140,11 +140,11 @@ def require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
     if changing is not None:
         why = f"the answer of task {task.name!r} changes within recording {changing!r}"
     elif split == "in-session" or alone or not any(table.labelled[:1].any() for table in data.tables):
-        why = "no first row of a longer recording is tested here"
+        why = "the test set has no first row of a longer recording"
     else:
         return
     raise NotApplicable(
-        f"Protocol {FIRST_FRAME.name!r} tests if a recording's first row alone tells the answer; {why}.",
+        f"Protocol {FIRST_FRAME.name!r} cannot test if a recording's first row alone tells the answer: {why}.",
         hint="Compare with split `shuffled` instead, or use a split that keeps recordings whole.",
     )
 

@@ -79,8 +79,8 @@ def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[
     the earliest alarm leaves later events at least as many alarms. The number of pairs is therefore the largest
     possible [1]_ (a convex bipartite graph whose intervals do not nest).
 
-    Of all largest matchings this one has the first alarms: if two alarms are in the window of one event, the first
-    gives the latency, and the second is a false positive.
+    Of all largest matchings, the matching with the earliest alarms is returned: if two alarms are in the window of one
+    event, the first gives the latency, and the second is a false positive.
 
     References
     ----------
@@ -251,7 +251,7 @@ class ThresholdCurve:
         return self.scores.row(np.searchsorted(self.threshold, threshold, side="left"))
 
     def operating_point(self, max_false_alarms_per_minute: float) -> float:
-        """Return the threshold with the largest recall, within this bound of false alarms per minute.
+        """Return the threshold with the largest recall, within a given bound of false alarms per minute.
 
         Ties are broken by the larger F1, then by the higher threshold. Infinity is returned if no finite threshold
         within the bound is better. Choose it on validation recordings, and apply it to others with :meth:`at`.
@@ -264,7 +264,7 @@ class ThresholdCurve:
         return float(self.threshold[self._allowed(max_false_alarms_per_minute)[0]])
 
     def found_share(self, max_false_alarms_per_minute: float) -> FloatArray:
-        """Return, for each event, the share of bounds from 0 to this maximum of false alarms at which it is hit, (e,).
+        """Return (e,) shares of the bounds of false alarms, from 0 to this maximum, at which each event is hit.
 
         For each bound, the threshold is the operating point on these recordings. The mean over events is the area
         under recall over false alarms per minute up to the maximum, divided by the maximum.
@@ -282,7 +282,7 @@ class ThresholdCurve:
         return np.asarray(share @ np.isfinite(self.scores.latency_s[best]))
 
     def _allowed(self, max_false_alarms_per_minute: float) -> IntArray:
-        """Return the indices of thresholds within this bound of false alarms per minute, best first."""
+        """Return the indices of thresholds within a given bound of false alarms per minute, best first."""
         rate = self.scores.false_alarms_per_minute
         if np.any(np.isnan(rate)) or self.scores.latency_s.shape[-1] == 0:
             raise DataError(
@@ -310,7 +310,7 @@ def threshold_curve(recordings: Sequence[ScoredRecording], policy: AlarmPolicy) 
 
 
 def _of_one(recording: ScoredRecording, policy: AlarmPolicy) -> ThresholdCurve:
-    """Return the curve of one recording, at those values of its score at which alarms change."""
+    """Return the curve of one recording, at the values of its scores at which alarms change."""
     found = [(np.inf, np.zeros(0, dtype=np.int64))]
     for threshold in np.unique(recording.score[~np.isnan(recording.score)])[::-1]:
         raised = alarms(recording.t_ns, recording.score >= threshold, policy)

@@ -39,7 +39,7 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     UnknownNameError
-        If a name is not that of a column.
+        If a name is not the name of a column.
     """
     known = {name: name for name in ALL} | {shown: name for name, shown in SHOWN.items()}
     names = [name.strip() for name in names]

@@ -112,7 +112,7 @@ def _pair(kind: Kind, first: str, second: str, one: Row | None, other: Row | Non
         elif row["status"] != "done":
             refused = f"{name} {row['status']}: {row['reason']}"
     if one and other and (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
-        refused = refused or "they were scored by different metrics or classes"
+        refused = refused or "the two cells were scored by different metrics or classes"
     found = difference(one, other) if one and other and not refused else None
     return PairwiseComparison(kind, first, second, one, other, refused, found)
 

@@ -69,7 +69,7 @@ def _block(block: Block, required: Requirements, task: TaskSpec, specs: Mapping[
         if not block.lines[0].row["simulated"]:
             notes += ("The largest force behind these scores is unknown: the rows do not state it.",)
         elif required.range_n > most_n:
-            notes += (f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown.",)
+            notes += (f"Scores are of forces up to {most_n:.3g} N; errors at larger forces are unknown.",)
     return replace(block, lines=tuple(line for _, line in found), verdict=verdicts, notes=notes)
 
 

@@ -60,7 +60,7 @@ class Sensitivity:
         self.order = _order(self.stated)
         self.rows: dict[str, dict[str, Row]] = {}
         self.changes: dict[str, dict[str, Difference]] = {}
-        """Changes from the scores as stated, by set of ends and sensor, over the seeds that both have."""
+        """Changes of scores from those with stated nuisances, by set of ends and sensor, over common seeds."""
         for name, own in variants.items():
             seeds = {(row["sensor"], row["seed"]) for row in own}
             same = _by_sensor([row for row in rows if (row["sensor"], row["seed"]) in seeds])
@@ -73,17 +73,17 @@ class Sensitivity:
             }
 
     def change(self, name: str, sensor: str) -> float:
-        """Return a sensor's change of score from that as stated; 0 if the sensor lacks the nuisance."""
+        """Return a sensor's change of score from that with stated nuisances; 0 if the sensor lacks the nuisance."""
         found = self.changes[name].get(sensor)
         return 0.0 if found is None else found.value
 
     def gain(self, name: str) -> float:
-        """Return the improvement of the score over that as stated, as the mean over the sensors."""
+        """Return the improvement of the score over that with stated nuisances, as the mean over the sensors."""
         sign = -sign_of(next(iter(self.stated.values())))
         return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
 
     def verdict(self, name: str) -> str:
-        """Return a text on the order of the sensors for a set of ends: it stays, turns round, or is not shown."""
+        """Return a text: the order of the sensors stays or turns round at a set of ends, or is not shown."""
         order = _order({**self.stated, **self.rows[name]})
         if any((worse, better) in order for better, worse in self.order):
             return TURNED

@@ -201,7 +201,7 @@ def _may_be_placed(row: Row) -> bool:
 LEAK_SHARE = 0.5
 """Share of the skill (score beyond the trivial answer's) at which the first frame's skill is called a leak."""
 TAIL = 0.025
-"""Largest probability of guessing as often right as the first frame, for it to be better than a guess."""
+"""Largest probability that a guess is right as often as a first frame that counts as better than a guess."""
 FEWEST_RECORDINGS = 5
 """Smallest number of test recordings for a statement on a regression from first frames."""
 
@@ -217,7 +217,7 @@ def _question(row: Row) -> tuple[str, ...]:
 
 
 def _stamped(row: dict[str, Any], first: Row | None) -> dict[str, Any]:
-    """Return a row with a stamp if it leaks, given the row of the same question from first frames."""
+    """Return a row with a stamp if it leaks, given the result of first frames for the same question."""
     # A split that keeps nothing apart has a stamp of its own.
     asked = row["protocol"] == DEPLOYABLE.name and row["split"] not in ("shuffled", "in-session")
     if first is None or row["is_baseline"] or row["status"] != "done" or not asked or row["baseline"] is None:

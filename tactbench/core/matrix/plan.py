@@ -126,10 +126,10 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
 
 
 def _probes(task: TaskSpec, ways: Sequence[Way]) -> list[Way]:
-    """Return the ways in which the answers of `ways` are probed for leakage.
+    """Return the pairs (protocol, split) by which the answers of `ways` are tested for leakage.
 
     These are `deployable` with the same split, `first-frame`, and shuffled rows. A split in time separates no
-    recordings and is not probed.
+    recordings and is not tested.
     """
     found = []
     for protocol, split in ways:

@@ -50,7 +50,7 @@ class StoredCell:
             return [str(error)]
         if not missing:
             return [] if self.store.finished(key) or not before else differences(before, now)
-        text = f"{len(missing)} of {len(self.paths)} recordings are missing, {missing[0].stem} first"
+        text = f"{len(missing)} of {len(self.paths)} recordings are missing, for example {missing[0].stem}"
         reason = f"{text}: they were never made, were removed, or have another key now"
         return [*(differences({**before, "data": {}}, {**now, "data": {}}) if before else []), reason]
 

@@ -287,7 +287,7 @@ def _check_api_version(module: str, written_for: object) -> None:
     if written_for != here:
         raise PluginContractError(
             f"{module} states TACTBENCH_API = {written_for!r}, but this tactbench has version {here} of the interface.",
-            hint=f"Update the older of plugin and tactbench, and state TACTBENCH_API = {here}: see docs/stability.md.",
+            hint=f"Update plugin or tactbench, whichever is older; state TACTBENCH_API = {here} (docs/stability.md).",
         )
 
 

@@ -107,11 +107,11 @@ def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by:
     except ValidationError as error:
         raise PluginContractError(
             f"{what} gives no valid force path for {values}: {complaint(error)}.",
-            hint="Its times must ascend from 0 s, and its forces must be finite and 0 N or more.",
+            hint="The path's times must ascend from 0 s, and its forces must be finite and 0 N or more.",
         ) from error
     if not isinstance(made, ForcePath):
         raise PluginContractError(
-            f"{what} returned a {type(made).__name__}, and a ForcePath is expected.",
+            f"{what} returned a {type(made).__name__} where a ForcePath is expected.",
             hint=f"Correct {descriptor.where}.",
         )
     listed = ", ".join(f"{name} {value:g} {descriptor.parameters[name].unit}" for name, value in values.items())

@@ -25,7 +25,7 @@ from tactbench.core.pool.child import UNLIMITED, Limits, end_of, plain_error, re
 __all__ = ["UNLIMITED", "Engine", "InProcess", "Limits", "Pool", "preload"]
 
 START_S = 60.0
-"""Time limit for a process to begin with its first item [s]; with `spawn`, libraries are imported before."""
+"""Time limit [s] for a process to begin with its first item; with `spawn` it includes the import of libraries."""
 POLL_S = 0.05
 """Time between two checks of a child's memory and time [s]."""
 KILL_DELAY_S = 0.2
@@ -215,7 +215,7 @@ class _Child:
     def _crashed(self) -> Crashed:
         code = self._process.exitcode or 0
         if code < 0:
-            hint = "See its log. If memory was short, give a smaller --jobs, or a limit with --memory MB."
+            hint = "See the process's log. If memory was short, give a smaller --jobs, or a limit with --memory MB."
             text = f"The process was ended by signal {-code} ({signal.Signals(-code).name})."
             return Crashed(text, hint=hint, signal=-code)
         text = f"The process ended with exit code {code} and gave no result."

@@ -145,9 +145,9 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 def on_host_clock(meta: RecordingMeta, stamps: dict[str, IntArray]) -> tuple[RecordingMeta, dict[str, IntArray]]:
     """Return `meta` with lines fitted for each stream with a device clock, and the host's times, (n,) [ns], by stream.
 
-    `stamps` are the device's and the host's times, (2, n) [ns], by stream. A stream in it has a device clock unless
-    `meta` states that its times are the host's; also in virtual time, where a device's link and batches delay samples
-    as well.
+    `stamps` are the device's and the host's times, (2, n) [ns], by stream. Each of these streams has a device clock
+    unless `meta` states that its times are the host's. This also holds in virtual time, where a device's link and
+    batches delay samples as well.
     """
     clocks, times = dict(meta.clocks), {}
     for stream, (device_ns, host_ns) in stamps.items():

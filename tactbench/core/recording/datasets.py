@@ -39,7 +39,7 @@ FOLDER = "datasets"
 
 @dataclass(frozen=True)
 class DataSet:
-    """A public data set: a mapping file that states the source of its files, found by the file's name."""
+    """A public data set: a mapping file, with the name of the data set, that states the source of its files."""
 
     path: Path
     """Path of the mapping file, whose name without ending is the data set's name."""
@@ -122,7 +122,7 @@ class DataSet:
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
                     f"{self.name}: {origin} could not be fetched{missed}: {error}. The files belong in {self.files}.",
-                    hint="Put the files there by hand, or name a folder with a copy as `root` (--root DIR); import "
+                    hint="Put the files into that folder, or name a folder with a copy as `root` (--root DIR); import "
                     "another version of a file with `tactbench import MAPPING`. Files fetched before are kept.",
                 ) from error
             progress.advance(name)

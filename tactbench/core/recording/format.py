@@ -49,7 +49,7 @@ def readable(path: Path) -> Iterator[None]:
     except FormatError:
         raise
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        hint = "Get it again from its source, or record it again."
+        hint = "Get the file again from its source, or record again."
         raise FormatError(f"{path} is damaged: {error}.", hint=hint) from error
 
 

@@ -296,7 +296,7 @@ def _lags(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: IntArray | None = None) -> bool:
-    """Return True if a column is a monotone function of another, at most `LAG` rows early or late.
+    """Return True if a column is a monotone function of another column shifted by at most `LAG` rows.
 
     `one` and `other` are (n,) numbers, NaN where there is no sample; `recording` is the number of each row's recording,
     (n,), as only rows of one recording are compared. None: there is one recording.

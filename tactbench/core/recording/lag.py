@@ -64,8 +64,8 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
     """Return the lag of a sensor's leading component behind that of a reference.
 
     `sensor_ns` (n,) and `force_ns` (m,) are increasing times [ns], meant to be of the same clock; `sensor` (n, p) and
-    `force` (m, q) are finite samples. None: no lag is above a sample and four standard errors, or the force allows no
-    estimate: a slow ramp, a sine without rests.
+    `force` (m, q) are finite samples. None: no lag exceeds one sample and four standard errors, or the force, such
+    as a slow ramp or a sine without rests, allows no estimate.
 
     Separable least squares (Golub and Pereyra 1973) in the lag and its linear change, by Gauss-Newton steps from where
     the cross-correlation is best. The error combines the jackknife over eight stretches of time and the difference

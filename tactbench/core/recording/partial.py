@@ -121,14 +121,14 @@ class JournalBlocks:
                 left[stream] = left.get(stream, 0) - len(columns["data"])
                 yield stream, columns
         if any(count > 0 for count in left.values()):
-            raise RecordingError(f"{self.path} has lost rows, by stream: {left}.", hint="Check the disk.")
+            raise RecordingError(f"{self.path} has lost rows (number by stream: {left}).", hint="Check the disk.")
 
 
 def rescue(path: Path, target: Path) -> None:
     """Convert an unfinished recording into a finished one at `target`, excluded from evaluations as interrupted.
 
     The file of the unfinished recording is kept; it may still grow: the blocks present at this moment are converted.
-    Raises MissingRecordingError if there is no such file, FormatError if the file is not an unfinished recording, and
+    Raises MissingRecordingError if the file does not exist, FormatError if the file is not an unfinished recording, and
     RecordingError if `target` exists, or cannot be written.
     """
     image.require_free(target)
@@ -138,7 +138,7 @@ def rescue(path: Path, target: Path) -> None:
         rows[stream] += len(columns["data"])
     meta = meta.model_copy(update={
         "remarks": (*meta.remarks, REMARK),
-        "excluded": meta.excluded or "interrupted: it broke off, and was rescued",
+        "excluded": meta.excluded or "interrupted: the recording broke off, and was rescued",
         "streams": {name: one.model_copy(update={"written": rows[name]}) for name, one in meta.streams.items()},
     })  # fmt: skip
     image.store(target, meta, blocks, {}, aside=completing_path(target))

@@ -155,8 +155,8 @@ class UnwrittenRecording(Recording):
 def open_recording(path: Path) -> Recording:
     """Open a finished recording.
 
-    Raises MissingRecordingError if there is no such file, and FormatError if the file is not a recording, is damaged or
-    unfinished, or was written by a newer tactbench.
+    Raises MissingRecordingError if the file does not exist, and FormatError if the file is not a recording, is damaged
+    or unfinished, or was written by a newer tactbench.
     """
     import h5py
 
@@ -171,7 +171,7 @@ def open_recording(path: Path) -> Recording:
     except (OSError, RuntimeError, ValueError) as error:
         raise FormatError(
             f"{path} cannot be read, is not an HDF5 file, or was cut short: {error}.",
-            hint="Check its permissions, or get it again; convert files `….partial`, left by a crash, with `--rescue`.",
+            hint="Check permissions, or get the file again; convert files `….partial` left by a crash with `--rescue`.",
         ) from error
     try:
         with layout.readable(path):

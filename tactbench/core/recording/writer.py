@@ -38,7 +38,7 @@ class RecordingWriter:
         self._specs = layout.specs_by_name(meta)
         self._complete = False
         self._optional: dict[str, tuple[bool, bool]] = {}
-        """Whether the blocks of a stream have sequence numbers, and device times."""
+        """By stream, two booleans: blocks have sequence numbers, blocks have device times."""
         self._partial: Partial
 
     def __enter__(self) -> RecordingWriter:

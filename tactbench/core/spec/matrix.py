@@ -11,7 +11,7 @@ from tactbench.core.spec.scene import Simulation
 
 # Larger numbers in the settings of a run are typing errors, and would overflow.
 MOST_REPEATS = 1000
-"""Largest number of replicates. Each is recorded anew; the 95 % interval of the mean of this many is already within 6 %
+"""Largest number of replicates. Each replicate is recorded anew; the 95 % interval of the mean of 1000 is within 6 %
 of their standard deviation."""
 MOST_SECONDS = 366 * 86400.0
 """Largest time limit of a cell or a recording [s]: a year."""

@@ -120,7 +120,7 @@ def staircase(
     Parameters
     ----------
     peak, steps
-        Force of the highest level [N], and the number of levels above zero; UsageError unless it is whole.
+        Force of the highest level [N], and the number of levels above zero; UsageError unless the number is whole.
     dwell, rise, hold
         Durations of each level, of each step between levels (above 0), and of the unloaded start [s].
     rate
@@ -150,7 +150,7 @@ def sine(
     mean, amplitude
         Mean of the force, and amplitude of the swing [N]. UsageError is raised if the amplitude exceeds the mean.
     frequency, periods
-        Frequency [Hz], and the number of periods: UsageError unless it is whole.
+        Frequency [Hz], and the number of periods; UsageError unless the number is whole.
     rise, hold
         Time from zero to the lowest force (above 0), and without load before [s].
     rate
@@ -158,8 +158,7 @@ def sine(
     """
     if amplitude > mean:
         raise UsageError(
-            f"The profile 'sine': amplitude is given as {amplitude:g} N, and at most the mean force, {mean:g} N, is "
-            "expected.",
+            f"The profile 'sine': amplitude is {amplitude:g} N, which exceeds the mean force of {mean:g} N.",
             hint="Give a smaller amplitude or a larger mean: an indenter cannot pull.",
         )
     points = _whole("sine", "periods", periods) * PER_PERIOD
@@ -172,7 +171,7 @@ def _whole(profile: str, name: str, given: float) -> int:
     """Return the parameter `given` as an integer; raise UsageError unless it is a whole number of at least 1."""
     if given < 1 or given != int(given):
         raise UsageError(
-            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number, 1 or more, is expected."
+            f"The profile {profile!r}: {name} is given as {given:g} where a whole number of at least 1 is expected."
         )
     return int(given)
 

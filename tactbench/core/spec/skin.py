@@ -44,7 +44,7 @@ class SheetTable(Frozen):
         shape = {len(self.angle_deg)} == {len(row) for row in self.value_mm}
         ascending = all(a < b for axis in (self.x_mm, self.angle_deg) for a, b in itertools.pairwise(axis))
         if not (shape and self.x_mm and len(self.value_mm) == len(self.x_mm) and ascending):
-            raise ValueError("a table over a sheet needs ascending axes, and a finite length for each of their pairs")
+            raise ValueError("a table of lengths needs ascending x_mm and angle_deg, and one length for each pair")
         return self
 
     @property

@@ -156,7 +156,7 @@ def _unpaired(first: Row, second: Row, value: float, groups: list[PairableRows])
     deviation = float(np.sqrt(sum((group.influence**2).sum() for group in groups)))
     freedom = min(group.freedom for group in groups)
     p = two_sided_p(value / deviation, freedom) if deviation > 0 else None
-    method = "not paired (the replicates differ), Student's t (of two degrees of freedom the smaller)"
+    method = "not paired (the replicates differ), Student's t (the smaller of two degrees of freedom)"
     n = min(len(group.names) for group in groups)
     ends = _ends(first, value, deviation, freedom)
     return Difference(value, *ends, p, None if p is None else 0.0, n, unit, paired=False, method=method)

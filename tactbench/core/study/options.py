@@ -81,7 +81,7 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
     given: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
         field, _, number = part.partition("=")
-        wrong = f"{field.strip()} of {name!r} is given as {number!r}; a finite number is expected."
+        wrong = f"{field.strip()} of {name!r} is given as {number!r} where a finite number is expected."
         given[field.strip()] = _number(number, wrong, f"Write, for example, radius=4; see `tactbench show {name}`.")
     return name.strip(), given
 
@@ -115,7 +115,7 @@ def simulation_of(
     if not (change or given or stated.nuisances):
         return stated
     if not registry.rigs[rig].simulated:
-        raise UsageError(f"--effects and --set are for simulated rigs; {rig} is none.", hint="Leave out both options.")
+        raise UsageError(f"--effects and --set need a simulated rig, not {rig}.", hint="Leave out both options.")
     scenarios = [name for sensor in registry.sensors for name in sensor.spec.scenarios]
     for key, what, known in (("scenario", "scenario", scenarios), ("rung", f"rung of {rig}", registry.rigs[rig].rungs)):
         if key in change and change[key] not in known:

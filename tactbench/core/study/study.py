@@ -164,7 +164,7 @@ STRONGEST = 3
 
 
 def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[Row]:
-    """Run a task as stated, and with `nuisances` (empty: all) at the ends of their ranges; return rows of failed cells.
+    """Run a task as its scenes state, and with `nuisances` (empty: all) at range ends; return rows of failed cells.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
     registry = installed()
     matrix = matrix_of(study, registry)
     if not registry.rigs[matrix.rig].simulated:
-        raise UsageError(f"Nuisances are set on simulated rigs; {matrix.rig} is none.", hint="Use the rig twin.")
+        raise UsageError(f"Nuisances need a simulated rig, not {matrix.rig}.", hint="Use the rig twin.")
     singles = _singles(matrix, registry, nuisances)
     store, choice = Store(study.out), EngineChoice(jobs=study.jobs)
     untimed = matrix.model_copy(update={"latency": False})  # times would be measured with nothing else at work

@@ -48,7 +48,7 @@ class TerminalOperator:
             _drop_input()
             remark(f"{text}\nPress Enter when this is done, Ctrl-C to end.")
             if not sys.stdin.readline():
-                raise RigError("The step was not confirmed: stdin was closed.", hint="Press Enter when it is done.")
+                raise RigError("The step was not confirmed: stdin was closed.", hint="Press Enter after the step.")
 
 
 def _drop_input() -> None:

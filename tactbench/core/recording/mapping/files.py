@@ -58,8 +58,8 @@ class RawRecording(NamedTuple):
 def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
     """Return the files that belong together, in the order of the first table's paths, and sentences about other files.
 
-    Raises MappingError if a pattern matches no file, or broken links, a path does not match its expression, a file has
-    several matches in another table, or no file has a match.
+    Raises MappingError if a pattern matches no file or only broken links, a path does not match its expression, a file
+    has several matches in another table, or no file has a match.
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")

@@ -173,7 +173,7 @@ def import_log(
     `options` are those of the sensor's log reader, by name; `session`, `role` and `labels` are fields of
     :class:`~tactbench.core.spec.recording.RecordingMeta`. With `replace`, an existing file at `out` is replaced.
 
-    Raises MissingRecordingError if there is no such log, UsageError if the sensor has no reader for logs, the file is
+    Raises MissingRecordingError if the log does not exist, UsageError if the sensor has no reader for logs, the file is
     no such log, an option is not known or `out` is no name for a recording, and RecordingError if `out` exists or
     cannot be written.
     """
@@ -266,7 +266,7 @@ def _locked(folder: Path) -> Iterator[bool]:
 
 
 def _place(folder: Path, out: Path) -> None:
-    """Move the recordings in `folder` to `out`, and remove it; while it exists, rigs do not replay `out`."""
+    """Move the recordings in `folder` to `out`, and remove `folder`, which keeps rigs from replaying `out`."""
     for path in sorted(folder.glob("[!.]*")):
         path.replace(out / path.name)
     shutil.rmtree(folder, ignore_errors=True)
@@ -379,7 +379,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
 
 
 def _in_place(made: Imported, out: Path, *, replace: bool) -> Imported:
-    """Return a recording with its path in `out`; if it is already there with the same content, it is not moved."""
+    """Return a recording with its path in `out`; not moved if `out` already has a recording with equal content."""
     target = out / made.path.name
     if target.exists() and not replace:
         there = ""

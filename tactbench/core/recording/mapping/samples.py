@@ -87,7 +87,7 @@ def times(table: Table, time: Time) -> IntArray:
         if time.epoch == "unix":
             year = dates[row].astype("M8[Y]")
             raise MappingError(
-                f"{table.where(row)}: column {time.column!r} in {time.unit} since 1970 would be the year {year}.",
+                f"{table.where(row)}: column {time.column!r}, read in {time.unit} since 1970, gives the year {year}.",
                 hint="Correct the unit, or write `epoch: start` or `epoch: unknown`.",
             )
     return stamps + round(time.offset_s * 1e9)

@@ -141,7 +141,7 @@ class Table:
             return math.inf
 
     def _refusal(self, row: int | np.integer[Any], column: Column, wanted: str) -> MappingError:
-        """Return the error for a cell that is not a number or time, as `wanted`, with the next step by its cause."""
+        """Return the error for a cell that is not of the type `wanted` (number or time), with a hint by its cause."""
         text = f"{self.where(row)}: column {column!r}: {self.texts(column)[row]!r} is not a {wanted}."
         hint = "Leave the column out of the mapping." if wanted == "number" else (
             "Times are numbers, or dates like 2024-03-01T12:00:00.25+01:00. A row without a time cannot be kept; check "
