@@ -266,7 +266,7 @@ def _locked(folder: Path) -> Iterator[bool]:
 
 
 def _place(folder: Path, out: Path) -> None:
-    """Move the recordings in `folder` to `out`, and remove `folder`, which keeps rigs from replaying `out`."""
+    """Move the recordings in `folder` to `out`, and remove `folder`, whose presence keeps rigs from replaying `out`."""
     for path in sorted(folder.glob("[!.]*")):
         path.replace(out / path.name)
     shutil.rmtree(folder, ignore_errors=True)
