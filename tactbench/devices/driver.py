@@ -1,4 +1,4 @@
-"""Base classes of drivers: one device on one link, read in blocks of rows; its options, and the numbers of its rows."""
+"""Base classes of drivers, which read one device on one link in blocks of rows; options, and numbering of the rows."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Driver(ABC):
         if not isinstance(self.link, self.link_kind):
             self.link.close()
             hint = f"Use a link like {self.address}."
-            raise UsageError(f"{device} cannot use the kind of link {self.link.address}.", hint=hint)
+            raise UsageError(f"{device} cannot be used on a link like {self.link.address}.", hint=hint)
 
     @property
     @abstractmethod

@@ -138,7 +138,7 @@ def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Count
 
 
 class RowEmulator(ABC):
-    """Emulator of a device read by a :class:`~tactbench.devices.driver.RowDriver`; it has link faults only."""
+    """Emulator of a device read by a :class:`~tactbench.devices.driver.RowDriver`; only its link can have faults."""
 
     stream: ClassVar[StreamSpec]
     """Stream of the values that the device senses."""

@@ -136,7 +136,7 @@ class ForceWatch:
         return problem
 
     def _take_newer(self, block: Block) -> int:
-        """Update numbers and times; return the largest number of samples equal in a row."""
+        """Update numbers and times; return the largest number of successive equal samples."""
         self.blocks.append(block)
         rows = block.data
         longest = 0

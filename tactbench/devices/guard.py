@@ -58,7 +58,7 @@ RETREAT_S = 1.0
 REFUSED = 3
 """Number of refused commands in a row after which the guard retreats (assumed)."""
 MOVING, NO_SAMPLE = "an axis is moving", "no force sample has come since the last move"
-"""Reasons why a command comes too early; it may be sent again, and does not count as refused."""
+"""Reasons why a command comes too early; such a command may be sent again, and does not count as refused."""
 
 
 def largest_force_n(
@@ -303,7 +303,7 @@ class LocalGuard:
     def _check_beat(self, now_ns: int) -> None:
         age_s, most_s = 1e-9 * (now_ns - self._beat_ns), self._limits.heartbeat_s
         if age_s > most_s:
-            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, limit {1e3 * most_s:.1f} ms")
+            self.trip(Trigger.BEAT_OLD, f"no heartbeat for {1e3 * age_s:.1f} ms, limit {1e3 * most_s:.1f} ms")
 
     def _read_devices(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
         """Read all devices; return the first problem, those of the force before those of axes."""
@@ -350,7 +350,7 @@ class LocalGuard:
     # Commands ---------------------------------------------------------------------------------------------------------
 
     def _command(self, beat: Beat) -> str:
-        """Carry out a beat's command; return the reason of a refusal, else an empty text."""
+        """Carry out the command in a heartbeat; return the reason if it is refused, else an empty text."""
         if beat.command is CommandKind.NONE:
             return ""
         if beat.command is CommandKind.RETREAT:

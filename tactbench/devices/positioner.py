@@ -156,7 +156,7 @@ class Positioner(Driver):
     Only :meth:`home` and the moves move the axis, and only :meth:`enable` and :meth:`home` give it power.
     :meth:`home`, :meth:`enable` and :meth:`disable` return at their end, within a bound. :meth:`move_to`,
     :meth:`move_by`, :meth:`halt` and :meth:`retreat` return at once; :meth:`update` is called until :attr:`moving` is
-    false. `halt` and `retreat` replace a move that is under way; the other moves are refused then.
+    false. While a move is under way, `halt` and `retreat` replace it; all other moves are refused.
 
     The call that detects a failure raises PositionerSilentError, another PositionerError, or a LinkError.
 

@@ -231,7 +231,7 @@ class Reading:
         for block in blocks:
             if block.stream not in self._streams:
                 hint = "Correct the driver: its streams must not change after start()."
-                raise RigError(f"{name} sent a block of {block.stream!r}, which is not among its streams.", hint=hint)
+                raise RigError(f"{name} sent a block of {block.stream!r}, which is no stream of {name}.", hint=hint)
             self._streams[block.stream].put(block, self._clock())
         return bool(blocks)
 

@@ -273,7 +273,7 @@ class PressingForce:
         self._counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them not finite or marked"
         if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
             hint = "Check the force sensor with `tactbench doctor`."
-            raise RigError(f"The zero of the force cannot be taken from so few good rows: {self._counted}.", hint=hint)
+            raise RigError(f"Too few rows are good for the zero of the force: {self._counted}.", hint=hint)
         rows = rows[good]
         wrong = [text for place, name in self._forces.items() for text in self._at_rest(name, rows[:, place])]
         if wrong:

@@ -192,7 +192,7 @@ class ScenePhysics(Rig):
     Parameters
     ----------
     rig
-        The simulated rig; None: it runs in the process of the emulated devices, or there are none.
+        The simulated rig; None: it runs in the process of the emulated devices, or no device is emulated.
     control
         Address ``host:port`` of the devices' process, from ``emulation: control`` of a rig file; empty: no such
         process, and without a rig nothing is simulated.

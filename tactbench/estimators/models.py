@@ -1,4 +1,4 @@
-"""Models for numbers and classes: trivial and linear ones, forests, boosting, neighbours, kernels, a network."""
+"""Regressors and classifiers: trivial and linear models, forests, boosting, neighbours, kernels, a neural network."""
 
 from __future__ import annotations
 

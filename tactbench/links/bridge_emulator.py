@@ -63,7 +63,7 @@ class BridgeEmulator:
         return self._due[0][0] if self._due else math.inf
 
     def _executed(self, frame: Frame, now_s: float) -> bytes | None:
-        """Return the reply's payload, None if the reply is sent later; raises ValueError or struct.error to refuse."""
+        """Return the reply's payload, None if sent later; raises ValueError or struct.error to refuse the request."""
         if frame.version != VERSION or len(frame.payload) > self.largest_payload:
             raise ValueError("version is unknown, or payload is too large")
         match Kind(frame.kind):
@@ -81,7 +81,7 @@ class BridgeEmulator:
         raise ValueError("kind is unknown")
 
     def _run(self, frame: Frame, now_s: float) -> None:
-        """Run a batch after those before it."""
+        """Run a batch after the batches received earlier."""
         if len(self._due) >= self.holds:
             raise ValueError(FULL.decode())
         steps, rest = [], frame.payload

@@ -1,6 +1,6 @@
 """Links for byte streams and datagrams, and the base class of all links.
 
-A link is open when made, closed once, and has a named error for each kind of failure.
+The constructor of a link opens it, and it is closed once. Each kind of failure has an error class of its own.
 """
 
 from __future__ import annotations

@@ -134,7 +134,7 @@ class FrameDecoder:
         self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes; what is no valid frame between two zero bytes is dropped."""
+        """Return the frames that `data` completes; invalid data between two zero bytes are dropped."""
         *ended, rest = (self._pending + data).split(b"\0")
         self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
         return [frame for stuffed in ended if (frame := _frame_in(stuffed)) is not None]
@@ -188,7 +188,7 @@ FULL = b"full"
 """Text of the error reply to a batch for which the bridge has no room."""
 
 _ASK_S = 0.2
-"""Time between requests other than batches until the bridge answers [s] (assumed)."""
+"""Interval at which an unanswered request to the bridge, other than a batch, is repeated [s] (assumed)."""
 
 
 class SpiBridge(SpiLink):
@@ -245,7 +245,7 @@ class SpiBridge(SpiLink):
         return self._bytes.timer()
 
     def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
-        """Send a request other than a batch, again until it is answered; return the reply, and drop other frames."""
+        """Send a request other than a batch, repeated until it is answered; return the reply, and drop other frames."""
         end_s = self.timer() + timeout_s
         while (now_s := self.timer()) < end_s:
             self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))

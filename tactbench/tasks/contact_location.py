@@ -44,7 +44,7 @@ _STEPS = (0.7548776662466927, 0.5698402909980532)
 
 
 def _scenes() -> Iterator[PlannedScene]:
-    """Yield the recordings; any consecutive places are spread evenly over the square."""
+    """Yield the recordings; any run of consecutive places is spread evenly over the square."""
     order = count(1)
     for role, sessions, each in SESSIONS:
         for session in range(1, sessions + 1):

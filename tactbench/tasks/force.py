@@ -1,4 +1,4 @@
-"""Tasks: estimate forces from taxels: normal under a flat surface (Karl et al. 2016, III-A), shear, or three axes."""
+"""Tasks of estimating forces: normal under a flat surface (Karl et al. 2016, III-A), shear, or all three axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks on grasped objects: if one will slip, from a static reading before the lift, and which it is, by each frame."""
+"""Tasks on grasped objects: coming slip from a static reading before the lift, and the object's identity by frame."""
 
 from __future__ import annotations
 

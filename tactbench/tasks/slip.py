@@ -1,4 +1,4 @@
-"""Tasks: when the contact begins to slip, in which state of slip each frame is, and if a whole recording has a slip."""
+"""Tasks on slip: its onset, the state of slip in each frame, and presence of a slip in a whole recording."""
 
 from __future__ import annotations
 

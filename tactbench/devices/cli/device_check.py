@@ -1,4 +1,4 @@
-"""Check of this machine's ports, and of each device in a rig file: its identity, and its data while untouched."""
+"""Check of this machine's ports, and of the identity and the data at rest of each device in a rig file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class HostItem:
     name: str
     text: str = ""
     denied: str = ""
-    """Advice on the permission, if this user may not open the port; empty: it may be opened."""
+    """Advice on getting the permission to open the port; empty if this user may open it."""
 
 
 def look_at_host() -> Iterator[HostItem]:

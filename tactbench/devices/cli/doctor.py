@@ -29,8 +29,8 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, jog: str 
     """List ports and buses of this machine, with permissions, and check the devices of a rig.
 
     Nothing is opened without --rig-file, or if the rig refuses the file; only --jog starts a motor. Problems are
-    printed first. Exit code 1 if the rig refuses the file or a device has a problem, without a rig if a port may not be
-    opened; 2 for a wrong rig file.
+    printed first. Exit code 1 if the rig refuses the file or a device has a problem, or, without a rig file, if a port
+    may not be opened; 2 for a wrong rig file.
     """
     import time
     from dataclasses import asdict

@@ -87,7 +87,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     back = 0
 
     def look(since_ns: int = 0) -> str:
-        """Read axis and force, until a sample has come after a time; return the problem with the force, if any."""
+        """Read axis and force until a force sample from after `since_ns`; return the problem of the force, if any."""
         problem, until_ns = None, clock() + round(1e9 * OLD_S)
         while True:
             axis.update(0.0)

@@ -280,7 +280,7 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
 
     @cache
     def meant(turn: int) -> dict[str, tuple[float, float]]:
-        """Return a reading and its tolerance for each channel; any two channels differ in a turn."""
+        """Return the expected reading and its tolerance for each channel; any two channels differ in some turn."""
         levels = [(number // LEVELS**turn + 3 * turn) % LEVELS / (LEVELS - 1) for number in range(len(every))]
         return {one.name: _reading(one, level) for one, level in zip(every, levels, strict=True)}
 
@@ -300,7 +300,7 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
                 _steady(where, stream, meant(turn))
                 if not turn:
                     if not _as_meant(stream, meant(0))[0]:
-                        fail(where, "the first row is not as sensed: was it made before the first sample?")
+                        fail(where, "the first row is wrong; it may date from before the first sample")
                     continue
                 since_s = (0.0 if stream.t_ns is None else 1e-9 * stream.t_ns) - steps_s[-1]
                 if (~_as_meant(stream, meant(turn - 1)) & (since_s < -row_s)).any():
@@ -311,7 +311,7 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
 
 
 def _steady(where: str, stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> None:
-    """Fail unless the second half of a stream has the meant readings."""
+    """Fail unless the readings in the second half of a stream are as expected."""
     for column, channel in enumerate(stream.spec.channels):
         value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
         expected, near = meant[channel.name]
@@ -322,7 +322,7 @@ def _steady(where: str, stream: StreamData, meant: Mapping[str, tuple[float, flo
 
 
 def _as_meant(stream: StreamData, meant: Mapping[str, tuple[float, float]]) -> npt.NDArray[np.bool_]:
-    """Return an (n,) array that is true for rows of which at least half of the finite readings are as meant."""
+    """Return an (n,) array, true for rows in which at least half of the finite readings are as expected."""
     expected, near = np.transpose([meant[one.name] for one in stream.spec.channels])
     off = np.abs(good(stream) - expected)
     return np.asarray((off <= near).sum(axis=1) >= 0.5 * np.isfinite(off).sum(axis=1))

@@ -40,7 +40,7 @@ class EmulatedDevice:
     """Faults of the link; faults of the device itself are in its emulator."""
 
     def far_end(self) -> DeviceEmulator:
-        """Return the device's end of its link; an SPI device gets a bridge."""
+        """Return the device's end of its link: the emulator, or for an SPI device an emulated SPI bridge to it."""
         emulator: Any = self.emulator
         if self.link == "spi":
             emulator = BridgeEmulator(emulator.exchange, holds=HELD)
@@ -187,7 +187,7 @@ class EmulatedDevices:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Do nothing: the devices hold nothing of the operating system."""
+        """Do nothing: devices in virtual time hold no port and no other resource of the operating system."""
 
     def advance(self, until_ns: int) -> None:
         """Advance all devices as :meth:`VirtualTime.advance` does."""

@@ -172,7 +172,7 @@ class Bench(Rig):
 def build(context: RigContext) -> Bench:
     """Build the rig `bench`.
 
-    Raises UsageError if there is no rig file, its `physics` is no simulation, or the bench does not open its devices.
+    Raises UsageError if no rig file is given, its `physics` is no simulation, or it names devices besides sensors.
     """
     if context.rig_file is None:
         raise UsageError(

@@ -32,7 +32,7 @@ BEYOND_M = 1.0
 def quiet(scene: Scene) -> Scene:
     """Return the scene to simulate: the load follows the force profile exactly, without a filter of the force.
 
-    Raises NotApplicable if it slides, presses nothing or does not begin at 0 N: its recording lacks some forces then.
+    Raises NotApplicable if the scene slides, presses nothing or begins above 0 N: its recording then lacks some forces.
     """
     profile = scene.profile
     if scene.slide is not None:
@@ -56,7 +56,7 @@ class EmulatedPress:
     scene
         The scene of :func:`quiet` itself.
     skin_m
-        Position of the motor at which the indenter touches the skin, as its drive counts [m].
+        Position of the motor, as counted by its drive, at which the indenter touches the skin [m].
     largest_n
         Largest force that is simulated [N]; beyond it the skin is a spring with the stiffness at this force.
     rng
@@ -69,7 +69,7 @@ class EmulatedPress:
         profile = scene.profile
         self.skin_m = skin_m
         self.start_s = 0.0
-        """Begin of the scene on the devices' clock [s]."""
+        """Start of the scene on the devices' clock [s]."""
         self._hold_s, self._duration_s = profile.hold_s, profile.duration.to("s")
         self._s_per_n = (self._duration_s - self._hold_s) / profile.corners[1][-1]
         self._corners = profile.corners

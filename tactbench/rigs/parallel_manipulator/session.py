@@ -50,7 +50,7 @@ class Session:
     Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time,
     all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their home as
     long as drive and session live. Raises LinkError, RigError or UsageError if a link cannot be opened, or a device
-    does not answer or is not as stated.
+    does not answer or differs from the rig file.
 
     Parameters
     ----------

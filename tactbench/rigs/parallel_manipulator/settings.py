@@ -185,7 +185,7 @@ class Heights(Options):
 class Places(Options):
     """Settings of the manipulator's place for a scene: nominal contact point of the sensor, and permitted offsets.
 
-    The manipulator's x is the sensor's: state `azimuth_deg` of the legs from there.
+    The manipulator's x axis is the sensor's: state the legs' `azimuth_deg` from this axis.
     """
 
     x_mm: float = 0.0

@@ -1,4 +1,4 @@
-"""Geometry in millimetres: the grid of the unrolled skin, shapes of indenters, and the gap between both.
+"""Geometry in millimetres: the grid of the unrolled skin, shapes of indenters, and the gap between skin and indenter.
 
 ``x`` runs along the finger, ``s`` along the arc of its outer surface; ``theta = s / outer radius``.
 """

@@ -84,7 +84,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
             included.append(effect)
         asked, text, change = effect.name in signed, reason.text, reason.change
         if asked and (taken or reason.called_for):
-            text = f"{'included' if taken else 'left out'} as stated; else: {text}"
+            text = f"{'included' if taken else 'left out'} by the scene; without its statement: {text}"
         if reason.called_for and not taken:
             change = None  # what an effect would have changed that was called for is no bound any more
         entries[effect.name] = PlanEntry(
@@ -138,7 +138,7 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     kinds = tuple(dict.fromkeys(kind for kind in scene.observe if kind in present))
     if not kinds:
         raise NotApplicable(
-            f"The scene needs a channel of kind {' or '.join(scene.observe) or '(none is named)'}; {sensor.name} has "
+            f"The scene needs a channel of kind {' or '.join(scene.observe) or '(no kind given)'}; {sensor.name} has "
             f"{', '.join(sorted(present))}."
         )
     return kinds

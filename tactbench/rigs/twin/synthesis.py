@@ -145,7 +145,7 @@ class Track:
     streams: tuple[StreamSpec, ...]
     """The sensor's streams on this clock, limited to the recorded channels."""
     channels: tuple[ChannelSpec, ...]
-    """Channels of all these streams, in order."""
+    """Recorded channels of all streams on this clock, in order."""
     t_s: FloatArray
     """(n,) seconds since the recording's first sample."""
     force_n: FloatArray

@@ -140,7 +140,7 @@ class RimmedDiscs:
         return np.asarray(np.maximum((np.where(self._crossing, entering, passing) * self._exists).sum(axis=0), 0.0))
 
     def joints(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return conductances over sigma: to electrodes (shapes of `owner`, `under`), to the drive (nx*ns,)."""
+        """Return conductances over sigma from cells to electrodes (shape of `owner`) and to excitations (nx*ns,)."""
         flat = film_mm.reshape(-1)
         film = flat[self._cell]
         decay = self._decay(film)

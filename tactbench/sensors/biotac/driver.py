@@ -219,7 +219,7 @@ class BioTacDriver(Driver):
             self._received_ns = self.clock()
 
     def _take(self, reply: SpiReply) -> None:
-        """Take the rows of a batch from its reply; the batches sent before it are lost."""
+        """Take the rows of a batch from its reply; earlier batches that are still unanswered count as lost."""
         self._received_ns = self.clock()
         numbers = [number for number, _ in self._sent]
         if reply.number not in numbers:

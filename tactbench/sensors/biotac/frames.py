@@ -106,7 +106,7 @@ class FrameRows:
             seen[name] += 1
         self._expected: Counter[tuple[int, int]] = Counter((k, nth) for k, _, nth in self._places)
         self._rows: list[list[_Row]] = [[] for _ in self._streams]
-        """Rows of each stream in their order, the last of which may be incomplete."""
+        """Rows of each stream in order of time; the last row may be incomplete."""
 
     def put(
         self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None

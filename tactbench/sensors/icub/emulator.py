@@ -209,7 +209,7 @@ class Bus(DeviceEmulator):
     def _fingertip(self, now_s: float) -> tuple[list[int], int]:
         """Return the fingertip's taxel bytes and error word.
 
-        A taxel that is not acknowledged has the converter's result 0, without a chip all have FFFF [sourced: IF
+        A taxel without acknowledgement has the converter's result 0; without a chip all have FFFF [sourced: IF
         AD7147.cpp]: far above and below the result at rest, in the middle of the range [assumed], and out of range.
         """
         sensed = {**_REST, **self._senses(now_s)}

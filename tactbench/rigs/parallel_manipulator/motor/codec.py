@@ -169,7 +169,7 @@ class FaulhaberOptions(PositionerOptions):
     acceleration_unit_m_s2: float = Field(default=1e-3, gt=0.0)
     """Value of one unit of AC and DEC [m/s^2] (assumed likewise)."""
     current_unit_a: float = Field(default=1e-3, gt=0.0)
-    """Value of one unit of LPC, LCC [A] (sourced: Faulhaber manual MCBL 3564K024B CS, the rotary drive)."""
+    """Current per unit of the commands LPC, LCC [A] (sourced: Faulhaber manual MCBL 3564K024B CS, the rotary drive)."""
     lower_m: float | None = Field(default=None, lt=0.0)
     """Ends of travel [m]; the drive needs a negative and a positive end."""
     upper_m: float | None = Field(default=None, gt=0.0)
@@ -187,7 +187,7 @@ class FaulhaberOptions(PositionerOptions):
     @model_validator(mode="after")
     def _sendable(self) -> Self:
         if self.peak_force_n is not None and self.force_constant_n_a is None:
-            raise ValueError("peak_force_n needs force_constant_n_a: the drive takes a limit of current")
+            raise ValueError("peak_force_n needs force_constant_n_a, because the drive limits the current")
         return self
 
     @property
@@ -203,7 +203,7 @@ class FaulhaberOptions(PositionerOptions):
 
     @property
     def largest_force_n(self) -> float | None:
-        """Largest force [N]: current limit times force constant; None if one of both is not stated."""
+        """Largest force [N]: current limit times force constant; None unless both are stated."""
         limit_a, constant = self.current_limit_a, self.force_constant_n_a
         return None if limit_a is None or constant is None else limit_a * constant
 
@@ -240,13 +240,13 @@ class FaulhaberOptions(PositionerOptions):
 
 
 def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable[[float], int] | None = None) -> int:
-    """Return a value in units of the drive, rounded down by default: then no value but 0 may become 0."""
+    """Return a value in units of the drive, rounded down by default; only 0 itself may be rounded down to 0."""
     steps = value / unit if math.isfinite(value) else largest + 1
     # A quotient that is an integer but for rounding is that integer, not the one below.
     steps = int(steps * (1.0 + 4e-16)) if rounded is None else rounded(steps)
     if abs(steps) > largest or (steps == 0 != value and rounded is None):
         raise RigError(
-            f"The drive cannot be set to a {what} of {value:g}: it takes steps of {unit:g}, {largest} at most.",
+            f"The drive cannot be set to a {what} of {value:g}: the unit is {unit:g}, the limit {largest} units.",
             hint="Check this value and the drive's units in the rig file.",
         )
     return steps

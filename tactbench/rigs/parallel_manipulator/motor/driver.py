@@ -75,7 +75,7 @@ class FaulhaberDriver(Positioner):
         self._settings = _stated(self.options)
         self._exchange = Exchange(self.link, settings.clock, self.options.baud)
         self._watching = self._confirmed = self._earlier = False
-        """True while the motor is polled; once the drive has the target; if the next answer is of before the move."""
+        """Flags: motor is polled; drive has confirmed the target; next answer may date from before the move."""
         self._polled_ns = 0
         self._position: Line | None = None
         """Position whose status is queried next."""
@@ -111,7 +111,7 @@ class FaulhaberDriver(Positioner):
         return {"firmware": self._exchange.greet()}
 
     def start(self) -> None:
-        """Let the drive name refused commands, set and read back speeds and currents, and begin polling the motor."""
+        """Make the drive report refusals, set and read back speeds and currents, and begin polling the motor."""
         if not self._exchange.version:
             self._exchange.greet()
         # No source states the answer to ANSW itself.
@@ -187,8 +187,8 @@ class FaulhaberDriver(Positioner):
         """
         if self.moving or _ENDS[0] not in self._settings:
             raise NotReadyError(
-                "The motor is moving, or has no ends of travel.",
-                hint="Wait for the end of its move, or give lower_m and upper_m in the rig file.",
+                "The motor is moving, or its ends of travel are not stated.",
+                hint="Wait for the end of the move, or give lower_m and upper_m in the rig file.",
             )
         options, self.homed = self.options, False
         home = options.increments(options.home_m)
@@ -341,7 +341,7 @@ class FaulhaberDriver(Positioner):
         if (found := self._sure(query)) != argument:
             raise PositionerError(
                 f"The drive has {query} {found} after {command}{argument} was set.",
-                hint="Check if it was without power or set by another program, and the option against its manual.",
+                hint="Check if the drive lost power or another program set it; compare the option with its manual.",
             )
 
     # Polling ----------------------------------------------------------------------------------------------------------
@@ -376,7 +376,7 @@ class FaulhaberDriver(Positioner):
         position, self._position = self._position, None
         if line is None and self.moving and not self._confirmed:
             raise PositionerSilentError(
-                "The motor's drive did not answer after a move was sent; it may have carried it out.",
+                "The motor's drive did not answer after a move was sent; the move may have been made.",
                 hint="Check the cable; read the position before the next move.",
             )
         if earlier or line is None:
@@ -394,7 +394,7 @@ class FaulhaberDriver(Positioner):
             self._note_status(position, OperationStatus(int(line.text)))
 
     def _note_status(self, position: Line, status: OperationStatus) -> None:
-        """Store position and status; a move has ended if the drive reports so and has its target."""
+        """Store position and status; a move has ended if the drive reports its confirmed target as reached."""
         problem = ", ".join(str(bit.name).lower().replace("_", " ") for bit in status & _PROBLEMS)
         if status & _FAULTS or self._exchange.fault:
             self.enabled = self._exchange.fault = False
@@ -409,9 +409,9 @@ class FaulhaberDriver(Positioner):
 
 
 def _stated(options: FaulhaberOptions) -> dict[str, tuple[str, int]]:
-    """Return the stated settings by the query that reads each back: command and argument.
+    """Return command and argument of each stated setting, by the query that reads the setting back.
 
-    Raises RigError if the drive lacks such a value.
+    Raises RigError if the drive cannot be set to a stated value.
     """
     stated = {
         "GSP": ("SP", options.speed, options.speed_m_s),

@@ -45,7 +45,7 @@ FORCE_CONSTANT_N_A = 6.5
 tubular linear motors (assumed)."""
 PEAK_CURRENT_A, CONTINUOUS_CURRENT_A = 1.6, 1.0
 REACH_M = 10e-3
-"""Distance of the mechanical end stops from the place at power-on [m], without ends of travel in the options."""
+"""Distance of the mechanical end stops from the place at power-on [m], if the options state no ends of travel."""
 BEYOND_M = 2e-3
 """Distance of an emulated motor's end stops from the ends of travel in its options [m] (assumed)."""
 ANSWER_S = 1e-3
@@ -181,7 +181,7 @@ class Drive:
         return self._origin_m + self._options.position_m(increments)
 
     def answer(self, command: Command) -> str:
-        """Execute a command; return the drive's answer, of a command that it does not execute its refusal."""
+        """Execute a command; return the drive's answer, which is a refusal if the command is not executed."""
         name, number = command.name, command.argument or 0
         if command.argument is None and (found := self._queried(name)) is not None:
             return found

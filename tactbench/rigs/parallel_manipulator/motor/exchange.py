@@ -87,7 +87,7 @@ class Exchange:
         self._command = command.decode().strip()
 
     def query(self, name: str) -> None:
-        """Send a query; only while no answer is outstanding."""
+        """Send a query; permitted only while no answer is outstanding."""
         self._query, self._since_ns = name, self._clock()
         self._link.write(encode(name))
 
@@ -120,7 +120,7 @@ class Exchange:
     def greet(self) -> str:
         """Find the drive: end a partial command on its line, and read its version twice.
 
-        Raises LinkTimeout if the drive does not answer, or not twice the same.
+        Raises LinkTimeout if the drive does not answer, or its two answers differ.
         """
         self._link.write(b"\r")
         self.quiet()
@@ -156,7 +156,7 @@ class Exchange:
             case Kind.REFUSAL:
                 self.counts["refusals"] += 1
                 raise MotorRefusalError(
-                    f"The motor's drive refuses {self._command}, or a command before: {line.text}.",
+                    f"The motor's drive refuses {self._command}, or an earlier command: {line.text}.",
                     hint="Check that it is a 300x RS drive, enabled and cool, and the rig file against its manual.",
                 )
             case Kind.VALUE | Kind.TEXT if self._marking and line.text == self.version:

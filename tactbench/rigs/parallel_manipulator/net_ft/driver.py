@@ -1,6 +1,6 @@
 """Net F/T raw data transfer (RDT) over UDP: options, encoding of requests and records, and the driver of the box.
 
-Port 49152 of the sensor. A request has 8 bytes, a record 36, both big-endian (sourced: netft/pyNetFT,
+The sensor's port is 49152. Requests have 8 bytes, records 36, both big-endian (sourced: netft/pyNetFT,
 core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 """
 
@@ -130,7 +130,7 @@ WARNING = ERROR_SUMMARY | CONDITION_LATCHED
 
 
 def quality(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
-    """Return for each status word the quality mark of all six channels: saturation apart from other errors.
+    """Return for each status word the quality mark of all six channels: SATURATED, SUSPECT for other errors, or both.
 
     Errors are SUSPECT, not MISSING: the box's manual forbids use of the values, yet many status bits (on networks and
     other buses) do not concern the values, and the mark SUSPECT keeps them for the user's decision.

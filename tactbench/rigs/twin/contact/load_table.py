@@ -67,7 +67,7 @@ def slopes(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 class Interpolant:
-    """Piecewise cubic in (n,) ascending loads, n >= 2, of (n, c) values.
+    """Piecewise cubic interpolation of (n, c) values over (n,) ascending loads, n >= 2.
 
     `touch_down` (two of the loads; None: no such loads) are nodes where one spline ends and the next begins. Beyond the
     second the cubics' variable is ``(load - second load)^0.75``, rounded off; elsewhere it is the load itself.
@@ -216,7 +216,7 @@ def build_table(
 
 
 class _Builder:
-    """Nodes of one table, and two of them [N] between which the skin first touches the core (None: it never does)."""
+    """Nodes of a table, and the two nodes [N] between which the skin first touches the core (None: it never does)."""
 
     def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray]) -> None:
         self._press = press
@@ -295,7 +295,7 @@ class _Builder:
             self.node(start + (end - start) * share)
 
     def refine(self, tolerance: FloatArray, most_nodes: int) -> FloatArray:
-        """Add nodes beside the one with the largest error until all errors keep `tolerance`; return the bound."""
+        """Add nodes beside the node of largest error until all errors are within `tolerance`; return their bound."""
         while True:
             loads = sorted(self.nodes)
             fixed = {loads[0], loads[-1], *(self.touch_down or ())}

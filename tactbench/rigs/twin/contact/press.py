@@ -37,7 +37,7 @@ class AnyPress(ABC):
 
     touched_core = False
     fluid_pressure = False
-    """True if states hold the pressure of the fluid in the skin."""
+    """True if the solved states include the pressure of the fluid in the skin."""
 
     def __init__(self, medium: Medium, contact: Contact) -> None:
         self.medium = medium
@@ -116,7 +116,7 @@ class Press(AnyPress):
         self._solutions: dict[float, Solution] = {}
 
     def solve(self, force_n: float) -> Solution:
-        """Return the skin under a force above zero, with the core from the load on that closes the film."""
+        """Return the skin under a force above zero; loads that close the fluid film press it on the rigid core."""
         if force_n in self._solutions:
             return self._solutions[force_n]
         solution = self._started(force_n)

@@ -37,7 +37,7 @@ def _largest(scene: Scene, sensor: SensorSpec, *fields: str) -> Quantity | None:
 
 
 def _under_load(scene: Scene, text: str, unit: str = "count") -> Reason:
-    """Return a Reason to include an effect in a scene with a load, and to leave it out of others."""
+    """Return a Reason to include an effect in a scene with a load, or to leave it out of a scene without load."""
     return Reason(True, text, None, unit) if scene.profile.largest_n > 0 else _no(NO_LOAD, unit)
 
 

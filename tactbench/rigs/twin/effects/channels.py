@@ -263,7 +263,7 @@ def force_filter(run: Synthesis) -> None:
 
 
 def _change_forces(run: Synthesis, change: Callable[..., FloatArray]) -> None:
-    """Replace every reading (n,) of the force sensor by `change` of it, which is also given a tangential one's name."""
+    """Replace the (n,) readings of each force by what `change` makes of them, and of the name of a tangential force."""
     run.reference_n = change(run.reference_n)
     for name, (channel, read) in run.reference_more.items():
         if channel.kind == "force":

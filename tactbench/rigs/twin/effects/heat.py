@@ -58,7 +58,7 @@ def ac_temperature(run: Synthesis) -> None:
 
 
 def _thermistor(run: Synthesis, kind: ChannelKind) -> Iterator[tuple[Track, int, FloatArray]]:
-    """Yield the channels of a kind, and the (n,) readings of the thermistor in their counts; none without one."""
+    """Yield each channel of a kind with the thermistor's (n,) readings in its counts; nothing without a thermistor."""
     core, low_pass = HeatedCore.of(run.scene, run.sensor.spec), run.sensor.spec.parameters.get("thermal_low_pass")
     for track, column in run.columns(kind):
         thermistor = Thermistor.of(run.sensor.spec, track.channels[column].upper or 1.0)

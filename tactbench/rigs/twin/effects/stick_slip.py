@@ -300,7 +300,7 @@ class Mode:
 def swing(
     mode: Mode, u: FloatArray | float, speed: float, after_s: FloatArray | float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) after a slip began at `u` (n,)."""
+    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) after a slip starts at `u` (n,)."""
     w, r = mode.swing, mode.decay
     c, s = np.cos(w * after_s), np.sin(w * after_s)
     faded = np.exp(-r * after_s)
