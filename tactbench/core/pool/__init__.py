@@ -163,7 +163,7 @@ class _Child:
     def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
         self.over = False
         """True if the process has ended."""
-        self._limits = limits
+        self._limits, self._times_above = limits, 0
         context = _context()
         self._connection, theirs = context.Pipe()
         self._log, self._log_name = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
@@ -208,7 +208,10 @@ class _Child:
         if timeout_s is not None and spent_s > timeout_s + KILL_DELAY_S:
             text = f"Stopped after the time limit of {timeout_s:g} s."
             return TimedOut(text, hint="Give a larger --timeout SECONDS.")
-        if memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb:
+        above = memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb
+        # For a moment, a process that is being started shares the memory of its parent, which then counts twice.
+        self._times_above = self._times_above + 1 if above else 0
+        if self._times_above > 1:
             return OutOfMemory(f"Stopped: it used more than {memory_mb} MB of memory.", hint="Give a larger --memory.")
         return None
 
