@@ -111,7 +111,7 @@ class Fault:
         try:
             return TypeAdapter(cls).validate_python({"name": name, **given})
         except ValidationError as error:
-            raise UsageError(f"The fault {text!r} is wrong: {error.errors()[0]['msg']}.") from error
+            raise UsageError(f"The stated fault {text!r} is invalid: {error.errors()[0]['msg']}.") from error
 
     def active(self, now_s: float) -> bool:
         """Return True if the fault is active at `now_s`."""

@@ -244,7 +244,7 @@ class LocalGuard:
         return {FORCE: +force, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
-        """Retreat, and expect no more beats; this also clears a fault.
+        """Retreat, and expect no more heartbeats of the rig; this also clears a fault.
 
         `Report.not_out` stays until an operator has confirmed that the indenter is clear, also for the next guard.
         """

@@ -74,7 +74,7 @@ def presses(force_n: float, patterns: int) -> Points:
 
 
 def taps(force_n: float, patterns: int) -> Points:
-    """Return a force profile with eight taps in each pattern (30 ms, half a newton added), at uneven intervals."""
+    """Return a force profile of `patterns` times eight taps at uneven intervals; a tap adds 0.5 N for 30 ms."""
     points = []
     for number in range(8 * patterns):
         begin_s = 3.0 + PATTERN_S * (number // 8) + 1.3 * (number % 8) + 0.5 * (_GOLDEN * number % 1.0)

@@ -70,7 +70,7 @@ class CheckReport:
 
     @property
     def level(self) -> str | None:
-        """Level reached by the passed checks; None if a check failed."""
+        """Highest level of conformance of which every check has passed; None if any check failed."""
         passed = {one.check for one in self.of("passed")}
         if self.failed or not passed:
             return None

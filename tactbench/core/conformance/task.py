@@ -120,7 +120,7 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
 
 
 def _leaves(given: Mapping[str, Any], way: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the numbers (in SI units) and texts in a model's data, each with its place."""
+    """Yield the numbers (in SI units) and texts in a pydantic model's data, each with the path of its field."""
     for name, one in given.items():
         if isinstance(one, Mapping) and "unit" in one:
             yield f"{way}{name}", one["value"] * units.parse(one["unit"])[0]

@@ -1,4 +1,4 @@
-"""Scores and times with one setting varied after another, and errors of a simulated rig against its times."""
+"""Scores and times as one setting at a time is varied, and errors of a simulated rig against its computing time."""
 
 from __future__ import annotations
 

@@ -260,7 +260,7 @@ def _joined(folds: Sequence[Answers]) -> Answers:
 
 
 def _refuse(estimator: str, metric: Metric, score: float, tested: Answers) -> None:
-    """Raise for a score that is not a finite number: PluginContractError if answers are too large, else DataError."""
+    """Raise an error for a score that is not finite: PluginContractError if predictions are too large, or DataError."""
     if metric.function is None and np.isinf(score):
         raise PluginContractError(
             f"The estimator {estimator!r} answered with numbers up to {np.abs(tested.y_pred).max():.3g}: the "

@@ -128,7 +128,7 @@ class EventScores:
 
     @property
     def n_hits(self) -> IntArray:
-        """Return the (...) numbers of events that an alarm hit."""
+        """Return the numbers of events for which an alarm came, an array of shape (...)."""
         return np.asarray(np.isfinite(self.latency_s).sum(axis=-1), dtype=np.int64)
 
     @property

@@ -66,7 +66,9 @@ def failing_as(what: str) -> Iterator[None]:
     except TactbenchError:
         raise
     except (Exception, SystemExit) as error:
-        raise RigError(f"{what}: {error_text(error)}.", hint="`tactbench list plugins` names its plugin.") from error
+        raise RigError(
+            f"{what}: {error_text(error)}.", hint="`tactbench list plugins` shows the rig's plugin."
+        ) from error
 
 
 def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:

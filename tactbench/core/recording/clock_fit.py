@@ -90,7 +90,7 @@ def fit(device_ns: IntArray, host_ns: IntArray, stretch_ns: int = STRETCH_NS) ->
 
 
 def _runs(device_ns: IntArray) -> Iterator[tuple[int, slice]]:
-    """Yield the number of each run of a device's times, counted from 0, and the run's rows."""
+    """Divide a device's times where its clock restarts or leaps; yield each part's number, from 0, and its rows."""
     steps = np.diff(device_ns)
     edges = [0, *(np.flatnonzero((steps < 0) | (steps > LEAP_NS)) + 1).tolist(), len(device_ns)]
     yield from ((run, slice(*rows)) for run, rows in enumerate(itertools.pairwise(edges)) if len(device_ns))

@@ -59,7 +59,7 @@ class DataSet:
         """Address and SHA-256 of the data set's files; raises ConfigError if the mapping file has no `source`."""
         if self.mapping.source is None:
             raise ConfigError(
-                str(self.path), None, "It has no key `source`, so that it describes no data set.",
+                str(self.path), None, "The file has no key `source`; there is nothing to download.",
                 hint=f"Add `source`, or import files that you have: tactbench import {self.path}.",
             )  # fmt: skip
         return self.mapping.source

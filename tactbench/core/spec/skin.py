@@ -54,7 +54,7 @@ class SheetTable(Frozen):
 
     @property
     def most_mm(self) -> float:
-        """Largest length in the table."""
+        """Largest length [mm] in this table of lengths over the skin."""
         return max(map(max, self.value_mm))
 
     def at(self, x_mm: npt.NDArray[np.float64], angle_rad: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

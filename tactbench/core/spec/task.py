@@ -231,7 +231,7 @@ class TaskSpec(TaskFields):
         if framed != (self.answer_per == "frame"):
             raise ValueError("answer_per: frame and a target of frames require each other")
         if framed and not self.summaries:
-            raise ValueError("answer_per: frame needs summaries")
+            raise ValueError("answer_per: frame also needs the field summaries")
         if framed and "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time, and a frame would extend across a cut")
         if (self.kind == "events") != (self.alarms is not None and self.max_false_alarms_per_minute is not None):
@@ -249,7 +249,7 @@ class TaskSpec(TaskFields):
                 raise ValueError("summaries need answer_per: recording")
             return self
         if not self.summaries or not isinstance(self.target, LabelTarget):
-            raise ValueError("answer_per: recording needs summaries and a label")
+            raise ValueError("answer_per: recording also needs the field summaries, and a label as target")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording does not allow cuts")
         if unseen := {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at):

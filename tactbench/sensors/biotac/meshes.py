@@ -109,7 +109,7 @@ def film_table(outer_mm: float, dome_mm: float) -> SheetTable:
 
 
 def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
-    """Return the depth of the outer surface below cylinder and dome, for a skin of constant thickness over the film."""
+    """Return how far the skin's surface lies inside the ideal cylinder and dome, if the skin is equally thick."""
     reach = [(x, 0.0, outer_mm) for x in AT_X_MM]
     for degrees in AT_RAY_DEG:
         ray = math.radians(degrees)

@@ -84,9 +84,9 @@ class FingertipOptions(Options):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands of the set-up, in order; then the board takes a baseline and waits (old set-up of MTB4: sends).
+        """Commands of the set-up, in order; then the board takes a baseline and waits, or sends after an old set-up.
 
-        [sourced: icub-main CanBusSkin.cpp, but for the stop at the beginning: the board may be sending]
+        [sourced: icub-main CanBusSkin.cpp, except the first command, a stop, since the board may be sending]
         """
         if self.old_setup:
             halves = (OldSetup(cdc_offset=self.cdc_offset), OldSetup2(shift=self.shift, no_load=self.no_load))

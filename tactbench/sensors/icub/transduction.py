@@ -87,5 +87,5 @@ def _place_mm(taxel: ChannelSpec, outer_radius_mm: float) -> tuple[float, float]
 
 def _rest(taxel: ChannelSpec) -> float:
     if taxel.rest is None:
-        raise RigError(f"{taxel.name} has no rest level.", hint="State ChannelSpec.rest.")
+        raise RigError(f"The spec states no level at rest for {taxel.name}.", hint="State ChannelSpec.rest.")
     return taxel.rest.to("count")

@@ -333,8 +333,8 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, streams: dict
     given = {one: fill(getattr(names, one), words, f"recording.{one}") for one in ("name", "session", "trial", "role")}
     if not _FILE_NAME.match(given["name"]):
         raise MappingError(
-            f"The recording made from {origin} would be called {given['name']!r}, which is no file name.",
-            hint="Use letters, digits, dots, dashes and underscores; translate words under `words`.",
+            f"The recording made from {origin} would be called {given['name']!r}, which is not a valid file name.",
+            hint="Use letters, digits, dots, dashes and underscores; map other words to such names by the key `words`.",
         )
     reasons = [one.reason for one in mapping.exclude if any(fnmatchcase(file, one.files) for file in raw.files)]
     remarks = [] if mapping.clock != "none" else [

@@ -147,7 +147,7 @@ class FaulhaberDriver(Positioner):
         if abs(place_m - target_m) > CORRIDOR_M:
             self.disable()
             raise PositionerError(
-                f"The motor is at {place_m:g} m, its target at {target_m:g} m: its power was switched off again.",
+                f"The motor is at {place_m:g} m and would move to {target_m:g} m; its power was switched off.",
                 hint="Home it anew.",
             )
 

@@ -17,7 +17,7 @@ _INDEPENDENT = 1e-9
 
 
 def _stated(run: Synthesis) -> Iterator[tuple[Track, ChannelKind, list[int], Nuisances]]:
-    """Yield each track and channel kind for which the spec states nuisances, with the kind's columns and nuisances."""
+    """Yield stream, kind, columns and nuisances of each kind of channels for which the spec states nuisances."""
     for track in run.tracks:
         for kind, columns in track.by_kind().items():
             nuisances = run.nuisances(kind)
