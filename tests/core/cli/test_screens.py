@@ -43,7 +43,7 @@ def assert_one_clear_screen(done, says=""):
         (("run", "--set", "placement_scater_mm=0.3"), "'placement_scatter_mm'"),
         (("run", "--set", "placement_scatter_mm=0.3mm"), "'placement_scatter_mm=0.3mm'"),
         (("run", "--set", "noise_scale=-1"), "noise_scale"),
-        (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rigs"),
+        (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rig"),
         (("leaderboard", os.devnull), os.devnull),
         (("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5"), "replay"),
         (("record", "--sensor", "ideal", "--indenter", "knob", "--out", "no.h5"), "cylinder"),
