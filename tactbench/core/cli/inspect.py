@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,12 +40,12 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
         files = (rescue,)
     described = []
     for path in files:
-        with TemporaryDirectory() as folder:
-            shown = Path(folder) / "salvaged.h5" if salvage and rescue is None else path
-            if shown != path:
+        with ExitStack() as stack:
+            shown = path
+            if salvage and rescue is None:
+                shown = Path(stack.enter_context(TemporaryDirectory())) / "salvaged.h5"
                 convert(path, shown)
-            with open_recording(shown) as recording:
-                described.append({**describe(recording), "file": str(path)})
+            described.append({**describe(stack.enter_context(open_recording(shown))), "file": str(path)})
         if shape == "table":
             _print(described[-1])
     if shape == "json":
